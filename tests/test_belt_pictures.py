@@ -196,7 +196,7 @@ def film(run):
 class TestFilm:
     @pytest.mark.parametrize("k", [0, 60, 110, 200])
     def test_frame_shows_body_spring_belt_and_friction_at_its_instant(self, film, run, k):
-        film.show(k)
+        film.show_frame(k)
         time = 20.0 * k / 249
         x, velocity, force = (np.interp(time, run.time, run[name]) for name in ("x", "velocity", "friction_force"))
         above, below = film.body.ax, film.subfigs[0].axes[1]
@@ -220,9 +220,9 @@ class TestFilm:
         assert film.body.speeds.get_text() == f"body {sign}{abs(velocity):.3f} m s⁻¹, belt +0.100 m s⁻¹"
 
     def test_belt_carries_its_marks_along_with_a_body_that_sticks(self, film, run):
-        film.show(60)
+        film.show_frame(60)
         first, x = film.body.marks.get_xdata()[:-1:3], film.body.body.get_x()
-        film.show(61)
+        film.show_frame(61)
         then, now = film.body.marks.get_xdata()[:-1:3], film.body.body.get_x()
         step = (then[:5, None] - first[None]).ravel()
         assert np.abs(step - (now - x)).min() < 1e-12

@@ -43,7 +43,7 @@ _SIGNS = {"minus": "\N{MINUS SIGN}", "plus": "+", "play": "▶", "play fa-flip-h
 _SIGNS |= {"fast-backward": "⏮", "step-backward": "◁", "step-forward": "▷", "fast-forward": "⏭"}
 
 # Inches, dots per inch, and colours of a frame of a page. Codecs of mp4 need even numbers of pixels.
-_SIZE, _DPI, _COLOURS = (10.8, 5.4), 100, 64
+_SIZE, _DPI, _COLOURS = (10.8, 5.4), 100, 128
 
 
 def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> FuncAnimation:
@@ -81,7 +81,7 @@ def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> F
     True
     """
     film = _Film(ds, fps, duration)
-    return FuncAnimation(film, film.show, frames=len(film.states["time"]), interval=1000.0 / fps, blit=True)
+    return FuncAnimation(film, film.show_frame, frames=len(film.states["time"]), interval=1000.0 / fps)
 
 
 def save_animation(
@@ -166,7 +166,8 @@ class _Film(Figure):
             self.body = RingArtists(left.add_subplot(), run, rig)
         else:
             run = belt_history(ds)
-            self.body = BeltArtists(*left.subplots(2, 1, height_ratios=[1.0, 1.6]), run)
+            above, below = left.subplots(2, 1, height_ratios=[1.0, 1.6])
+            self.body = BeltArtists(above, below, run)
         first, last = run["time"].values[[0, -1]]
         self.states = states_at(run, np.linspace(first, last, max(2, round(fps * duration))))
         entries = self.body.legend_entries()
@@ -187,12 +188,12 @@ class _Film(Figure):
         self.futures = [_cover_of_future(panel) for panel in panels]
         self.pixels = RendererAgg(*self.bbox.size, _DPI)
         self.background: Any = None
-        self.show(0)
+        self.show_frame(0)
         # Texts change from frame to frame: a layout that followed them would shake.
         self.draw_without_rendering()
         self.set_layout_engine("none")
 
-    def show(self, k: int) -> list[Artist]:
+    def show_frame(self, k: int) -> list[Artist]:
         """Move all moving artists to the `k`-th frame."""
         self.body.show(self.states, k)
         now = float(self.states["time"][k])
@@ -201,26 +202,29 @@ class _Film(Figure):
             cover.set(x=now, width=self.until - now if k + 1 < len(self.states["time"]) else 0.0)
         return [*self.body.moving, *self.futures]
 
-    def savefig(self, target: Any, **options: Any) -> None:
+    def savefig(self, fname: Any, *, transparent: bool | None = None, **options: Any) -> None:
         """Write a picture; a frame of a film several times as fast, with few colours, since pages hold every frame."""
         kind = options.get("format")
         if kind not in ("png", "rgba") or options.get("dpi") != _DPI:
-            super().savefig(target, **options)
+            super().savefig(fname, transparent=transparent, **options)
             return
         moving = sorted([*self.body.moving, *self.futures], key=Artist.get_zorder)
         if self.background is None:
-            for artist in moving:
-                artist.set_animated(True)
+            visible = [artist for artist in moving if artist.get_visible()]
+            for artist in visible:
+                artist.set_visible(False)
             self.draw(self.pixels)
             self.background = self.pixels.copy_from_bbox(self.bbox)
+            for artist in visible:
+                artist.set_visible(True)
         self.pixels.restore_region(self.background)
         for artist in moving:
             artist.draw(self.pixels)
         frame = Image.fromarray(np.asarray(self.pixels.buffer_rgba())).convert("RGB")
         if kind == "png":
-            frame.quantize(_COLOURS, dither=Image.Dither.NONE).save(target, "png")
+            frame.quantize(_COLOURS, dither=Image.Dither.NONE).save(fname, "png")
         else:
-            target.write(frame.convert("RGBA").tobytes())
+            fname.write(frame.convert("RGBA").tobytes())
 
 
 def _cover_of_future(panel: Axes) -> Rectangle:
