@@ -9,13 +9,12 @@ import os
 import platform
 import shlex
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from math import ceil, radians
+from math import radians
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -24,7 +23,7 @@ import numpy as np
 
 from ringsweep import config
 from ringsweep.models import batch, model_of
-from ringsweep.runs import cells, sweep
+from ringsweep.runs import cells, contenders, sweep
 from ringsweep.runs.executors import Execution
 from ringsweep.solvers.method import Result
 
@@ -142,50 +141,11 @@ class Times:
 
 
 def alternate(
-    contenders: Mapping[Any, Callable[[], Any]], rounds: int, shortest: float = 0.05, patience: float = 5.0
+    calls: Mapping[Any, Callable[[], Any]], rounds: int, **options: Any
 ) -> tuple[dict[Any, Times], dict[Any, Any]]:
-    """Time contenders in turn, forwards and backwards, so that other load on the machine slows all of them alike.
-
-    Contenders must be compiled before.
-
-    Parameters
-    ----------
-    contenders : mapping
-        Functions by name.
-    rounds : int
-    shortest : float
-        Least time of a measurement, s: a call that is shorter is repeated.
-    patience : float
-        A call that is longer than this (s) is timed only in the first round.
-
-    Returns
-    -------
-    times : dict
-        :class:`Times` by name.
-    results : dict
-        The last return value of each contender by name.
-    """
-    times: dict[Any, Times] = {name: Times([]) for name in contenders}
-    repeats: dict[Any, int] = {}
-    results: dict[Any, Any] = {}
-    for k in range(rounds):
-        for name in list(contenders)[:: 1 if k % 2 == 0 else -1]:
-            if times[name].wall and times[name].wall[0] > patience:
-                continue
-            if name not in repeats:
-                begin = time.perf_counter()
-                results[name] = contenders[name]()
-                once = time.perf_counter() - begin
-                if once >= shortest:
-                    times[name].wall.append(once)
-                    repeats[name] = 1
-                    continue
-                repeats[name] = ceil(shortest / max(once, 1e-6))
-            begin = time.perf_counter()
-            for _ in range(repeats[name]):
-                results[name] = contenders[name]()
-            times[name].wall.append((time.perf_counter() - begin) / repeats[name])
-    return times, results
+    """Times and results of functions, as :func:`ringsweep.runs.contenders.alternate` measures them."""
+    times, results = contenders.alternate(calls, rounds, **options)
+    return {name: Times(wall) for name, wall in times.items()}, results
 
 
 def heading(text: str) -> None:

@@ -108,7 +108,7 @@ def test_table_with_decreasing_times_is_refused_with_its_line(folder, capsys):
     assert "theta.csv, line 4: scene.drive.time.2: 0.5 s does not come after 1 s" in refused(capsys, "run", "case.yaml")
 
 
-@pytest.mark.parametrize("verb", ["run", "simulate"])
+@pytest.mark.parametrize("verb", ["run", "simulate", "precision"])
 @pytest.mark.parametrize("output", ["nowhere/out.nc", "case.yaml/out.nc", ".", "out.png"])
 def test_unwritable_output_is_refused_before_any_computation(folder, capsys, verb, output):
     assert output in refused(capsys, verb, "case.yaml", "-o", output)

@@ -15,7 +15,7 @@ from ringsweep.cli.precision_table import report
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import PRECISION
-from ringsweep.runs import contenders, precision
+from ringsweep.runs import precision
 from ringsweep.storage import netcdf
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -35,7 +35,7 @@ BELT = {
 def short():
     """Use few settings of rk4, to save time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contenders, "_STEPS", (100, 1000, 10_000))
+        patch.setattr(precision, "_STEPS", (100, 1000, 10_000))
         yield
 
 
@@ -90,7 +90,8 @@ class TestDataset:
 
     def test_contenders_are_rk4_and_the_method_of_auto_with_its_default(self, found):
         assert set(found["method"].values) == {"event", "rk4"}
-        assert "method: event, rtol: 1e-10" in found["solver"].values
+        assert found.attrs["configured"] == "method: event, rtol: 1e-10"
+        assert found.attrs["configured"] in found["solver"].values
 
     def test_dataset_is_unchanged_after_saving_and_loading(self, found, tmp_path):
         netcdf.save(found, tmp_path / "found.nc")
@@ -178,9 +179,6 @@ class TestRecommendation:
         text = report(found.assign_attrs(configured=found.attrs["recommended"]))
         assert "it is the solver of this configuration already: nothing needs to change" in text
 
-    def test_solver_of_the_configuration_is_named_even_if_it_is_the_default(self, found):
-        assert found.attrs["configured"] in found["solver"].values
-
     @pytest.mark.slow
     def test_unreachable_target_is_reported_with_the_closest_solver(self, folder, capsys):
         assert main(["precision", "belt.yaml", "--target", "1e-40", "--rounds", "1"]) == 0
@@ -213,7 +211,7 @@ class TestSample:
 
     @pytest.mark.slow
     def test_cells_without_a_reference_are_left_out_and_counted(self, config, monkeypatch):
-        monkeypatch.setattr(contenders, "_STEPS", (100,))
+        monkeypatch.setattr(precision, "_STEPS", (100,))
         monkeypatch.setattr(precision, "_TIGHTEST", {precision.Event: (1e-15, 1e-3)})
         many = yaml.safe_load((CONFIGS / "belt_viscous.yaml").read_text(encoding="utf-8"))
         many["scene"] = with_all_parts(many["scene"])
@@ -224,7 +222,7 @@ class TestSample:
 
     @pytest.mark.slow
     def test_settings_that_would_take_too_long_are_left_out_and_named(self, monkeypatch):
-        monkeypatch.setattr(contenders, "_BUDGET", 0.0)
+        monkeypatch.setattr(precision, "_BUDGET", 0.0)
         found = ringsweep.precision({"scene": BELT}, rounds=1, progress=False)
         assert found["setting"].values.tolist() == ["rtol 0.0001", "100 steps"]
         for name in ("event, rtol 1e-12", "rk4, 1000 steps", "rk4, 10000 steps"):
@@ -261,18 +259,11 @@ class TestInput:
         with pytest.raises(InputError, match=rf"sweep\.{part}\.friction\.law: each of coulomb, stiction"):
             ringsweep.precision({"scene": BELT, "sweep": sweep})
 
-    @pytest.mark.parametrize(
-        "arguments", [["--target", "0"], ["--target", "nan"], ["--target", "x"], ["--cells", "0"], ["--rounds", "-1"]]
-    )
+    @pytest.mark.parametrize("arguments", [["--target", "nan"], ["--cells", "0"], ["--rounds", "-1"]])
     def test_wrong_option_of_the_command_has_status_2(self, folder, arguments):
         with pytest.raises(SystemExit) as ended:
             main(["precision", "belt.yaml", *arguments])
         assert ended.value.code == 2
-
-    @pytest.mark.parametrize("output", ["nowhere/out.nc", ".", "out.png"])
-    def test_unwritable_output_is_refused(self, folder, capsys, output):
-        assert main(["precision", "belt.yaml", "-o", output]) == 2
-        assert output in capsys.readouterr().err
 
 
 @pytest.mark.slow

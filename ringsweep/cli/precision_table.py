@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 
-from ringsweep.runs.precision import wrong_and_worst
+from ringsweep.runs.contenders import judge
 
 
 def report(ds: xr.Dataset) -> str:
@@ -23,27 +21,39 @@ def report(ds: xr.Dataset) -> str:
     str
         Several lines.
     """
+    lines = table(ds)
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    aligned = ["  ".join([line[0].ljust(widths[0]), *map(str.rjust, line[1:], widths[1:])]).rstrip() for line in lines]
+    return "\n".join([*aligned, "", *_verdict(ds)])
+
+
+def table(ds: xr.Dataset) -> list[list[str]]:
+    """Header and rows, one for each contender, of a dataset of :func:`ringsweep.runs.contenders.compete`."""
     unit = ds["error_end"].attrs["units"]
-    separating = "error_separation" in ds and bool(np.isfinite(ds["error_separation"]).any())
-    header = ["", "ms per run", "steps", f"median error, {unit}", f"largest, {unit}"]
-    header += ["largest of separation, s"] * separating + ["wrong regimes", "wrong but not flagged"]
-    lines = []
+    rows = []
     for k in range(ds.sizes["contender"]):
         one = ds.isel(contender=k)
-        end, wrong = one["error_end"].values, one["regime_wrong"].values == 1
-        silent = one["flagged"].values[wrong] == 0
-        line = [f"{one['method'].item()}, {one['setting'].item()}", f"{1e3 * one['time_per_run'].item():.3g}"]
-        line += [f"{one['steps'].item():.0f}", f"{np.median(end):.1e}", f"{end.max():.1e}"]
-        if separating:
-            separation = one["error_separation"].values
-            line.append(f"{np.nanmax(separation):.1e}" if np.isfinite(separation).any() else "-")
-        lines.append([*line, f"{wrong.mean():.0%}", f"{silent.mean():.0%}" if wrong.any() else "-"])
-    return "\n".join([*_aligned(header, lines), "", *_verdict(ds, unit)])
+        end, wrong = one["error_end"].dropna("cell"), one["regime_wrong"].dropna("cell") == 1
+        row = {"": f"{one['method'].item()}, {one['setting'].item()}"}
+        if ds["error_end"].isnull().any():
+            row["cells"] = str(end.size)
+        row["ms per run"] = f"{1e3 * one['time_per_run'].item():.3g}"
+        if "steps" in ds:
+            row["steps"] = f"{one['steps'].item():.0f}"
+        row |= {f"median error, {unit}": f"{np.median(end):.1e}", f"largest, {unit}": f"{end.max():.1e}"}
+        if "error_separation" in ds and ds["error_separation"].notnull().any():
+            separation = one["error_separation"].dropna("cell")
+            row["largest of separation, s"] = f"{separation.max():.1e}" if separation.size else "-"
+        row["wrong regimes"] = f"{wrong.mean():.0%}" if wrong.size else "-"
+        if "flagged" in ds:
+            row["wrong but not flagged"] = f"{1 - one['flagged'][wrong.values].mean():.0%}" if wrong.any() else "-"
+        rows.append(row)
+    return [list(rows[0]), *(list(row.values()) for row in rows)]
 
 
-def _verdict(ds: xr.Dataset, unit: str) -> list[str]:
+def _verdict(ds: xr.Dataset) -> list[str]:
     """Sentences about sample, reference, cost of certificates and recommended solver."""
-    attributes = ds.attrs
+    attributes, unit = ds.attrs, ds["error_end"].attrs["units"]
     uncertainty = [f"{ds['reference_error_end'].values.max():.1e} {unit}"]
     if "reference_error_separation" in ds and np.isfinite(ds["reference_error_separation"]).any():
         uncertainty.append(f"{np.nanmax(ds['reference_error_separation'].values):.1e} s")
@@ -55,7 +65,7 @@ def _verdict(ds: xr.Dataset, unit: str) -> list[str]:
     if "left_out" in attributes:
         words.append(f"left out: {attributes['left_out']}")
     solvers = ds["solver"].values.tolist()
-    wrong, worst, meets = wrong_and_worst(ds)
+    wrong, worst, meets = judge(ds, attributes["target"])
 
     def reached(k: int) -> str:
         errors = "runs that failed"
@@ -82,11 +92,3 @@ def _verdict(ds: xr.Dataset, unit: str) -> list[str]:
     if attributes.get("configured") == name:
         words.append("it is the solver of this configuration already: nothing needs to change")
     return [*words, f"solver: {{{name}}}"]
-
-
-def _aligned(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
-    return [
-        "  ".join([line[0].ljust(widths[0]), *map(str.rjust, line[1:], widths[1:])]).rstrip()
-        for line in (header, *rows)
-    ]

@@ -1,138 +1,204 @@
-"""Methods and settings that :func:`ringsweep.precision` compares, and their timing."""
+"""Methods at settings that compete: their run times, taken in turn, and their errors beside a reference."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from time import get_clock_info, perf_counter, thread_time
-from typing import Any
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from statistics import median
+from typing import Any, NamedTuple
 
-from ringsweep.config import Config
-from ringsweep.errors import InputError
-from ringsweep.solvers.event import Auto, Event, Implicit
-from ringsweep.solvers.method import Result
-from ringsweep.solvers.rk4 import RK4
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
-# The tightest is two digits above the tolerance of the reference.
-_TOLERANCES: dict[type, tuple[float, ...]] = {
-    Event: (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12),
-    Implicit: (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
-}
-
-_STEPS = tuple(10**k for k in range(2, 8))
-
-# Seconds that one setting may take in a round.
-_BUDGET = 10.0
-
-# Shorter calls are repeated until they take this many seconds: the clock is too coarse for them.
-_MIN_SECONDS = 0.01
-
-# The time of the thread does not count other processes, but some systems measure it too coarsely.
-_clock = thread_time if get_clock_info("thread_time").resolution < 1e-4 else perf_counter
+from ringsweep.quantities.variables import OUTCOMES, PRECISION
 
 
-def contenders_for(config: Config) -> tuple[list[Any], list[str]]:
-    """Methods with settings, from cheap to expensive, without certificates; and why others are left out, in words."""
-    structure, configured = config.scene.structure, config.solver
-    best: Any = type(Auto().resolved(structure))
-    tolerances = {*_TOLERANCES[best], best.rtol} | ({configured.rtol} if isinstance(configured, best) else set())
-    limit = getattr(configured, "max_steps", best.max_steps)
-    found = [best(rtol=rtol, max_steps=limit, certify=False) for rtol in sorted(tolerances, reverse=True)]
-    steps = {*_STEPS} | ({configured.steps} if isinstance(configured, RK4) else set())
-    fixed = [RK4(steps=n, certify=False) for n in sorted(steps)]
-    try:
-        fixed[0].check(structure)
-    except InputError as error:
-        return found, [error.problem]
-    return found + fixed, []
-
-
-def setting_of(method: Any) -> str:
-    """The tolerance or the number of steps of a method, as text."""
-    return f"{method.steps} steps" if isinstance(method, RK4) else f"rtol {method.rtol!r}"
-
-
-def solver_yaml(method: Any) -> str:
-    """Text under ``solver`` in a configuration for this method: its setting, and options that are not defaults."""
-    options = {"steps": method.steps} if isinstance(method, RK4) else {"rtol": method.rtol}
-    options |= {
-        option.name: getattr(method, option.name)
-        for option in dataclasses.fields(method)
-        if option.name not in (*options, "certify") and getattr(method, option.name) != option.default
-    }
-    return ", ".join([f"method: {method.name}", *(f"{name}: {value!r}" for name, value in options.items())])
-
-
-@dataclass
-class TimedMethod:
-    """A method and its measured run times.
+class Answer(NamedTuple):
+    """What a contender says of some cells, the first ones of all.
 
     Attributes
     ----------
-    method : Method
-    seconds : list of float
-        Run time in each round.
-    result : Result
-        Result of the last run.
-    repeats : int
-        Runs per round.
+    end : ndarray of shape ``(cells,)``
+        Angle (rad) or displacement (m) at the end; not finite if the run failed.
+    separation : ndarray of shape ``(cells,)``
+        Time of separation, s, or NaN.
+    regime : ndarray of shape ``(cells, words)``, optional
+        Flags of the classification. Without them only whether the body separates is compared.
+    steps : float, optional
+        Steps of the integration, mean over the cells.
     """
 
-    method: Any
-    seconds: list[float] = field(default_factory=list)
-    result: Any = None
-    repeats: int = 1
-
-    def measure(self, run: Callable[[Any], Result]) -> None:
-        """Measure one round. The first round finds the number of repeats."""
-        elapsed = self._time_repeats(run)
-        while not self.seconds and elapsed < _MIN_SECONDS:
-            self.repeats *= 4
-            elapsed = self._time_repeats(run)
-        self.seconds.append(elapsed / self.repeats)
-
-    def _time_repeats(self, run: Callable[[Any], Result]) -> float:
-        start = _clock()
-        for _ in range(self.repeats):
-            self.result = run(self.method)
-        return _clock() - start
+    end: NDArray[np.float64]
+    separation: NDArray[np.float64]
+    regime: NDArray[Any] | None = None
+    steps: float | None = None
 
 
-def time_methods(
-    methods: Sequence[Any], run: Callable[[Any], Result], rounds: int, bar: Any
-) -> tuple[list[TimedMethod], list[str]]:
-    """Time methods alternately, forwards and backwards, so that other load on the machine affects all alike.
+@dataclass(frozen=True)
+class Contender:
+    """A method at a setting, compiled before.
+
+    Attributes
+    ----------
+    method, setting : str
+    run : callable
+        Returns an :class:`Answer`, or what :func:`compete` is told to read as one.
+    lanes : int
+        Runs in one call.
+    """
+
+    method: str
+    setting: str
+    run: Callable[[], Any]
+    lanes: int
+
+
+def alternate(
+    calls: Mapping[Any, Callable[[], Any]],
+    rounds: int,
+    shortest: float = 0.05,
+    patience: float = 5.0,
+    clock: Callable[[], float] = time.perf_counter,
+    done: Callable[[], Any] = lambda: None,
+) -> tuple[dict[Any, list[float]], dict[Any, Any]]:
+    """Time functions in turn, forwards and backwards, so that other load on the machine slows all of them alike.
+
+    Parameters
+    ----------
+    calls : mapping
+        Functions by name, compiled before.
+    rounds : int
+    shortest : float
+        Least time of a measurement, s: a call that is shorter is repeated.
+    patience : float
+        A call that is longer than this (s) is timed only in the first round.
+    clock : callable
+    done : callable
+        Called after each measurement.
 
     Returns
     -------
-    timed : list of TimedMethod
-    left_out : list of str
-        Settings that would take too long, by the time of the setting before, in words.
+    times : dict of list of float
+        Seconds in each round, by name.
+    results : dict
+        The last return value of each function by name.
     """
-    timed: list[TimedMethod] = []
-    left_out = []
-    latest: dict[type, TimedMethod] = {}
-    for method in methods:
-        before = latest.get(type(method))
-        if before is None:
-            # The first run may compile.
-            run(method)
-        else:
-            more = method.steps / before.method.steps if isinstance(method, RK4) else 1.0
-            expected = more * before.seconds[0]
-            if expected > _BUDGET:
-                left_out.append(
-                    f"{method.name}, {setting_of(method)} (about {expected:.0f} s a round; {_BUDGET:g} s are allowed)"
-                )
-                bar.update(rounds + 1)
-                continue
-        latest[type(method)] = TimedMethod(method)
-        latest[type(method)].measure(run)
-        bar.update()
-        timed.append(latest[type(method)])
-    for k in range(1, rounds):
-        for one in timed[:: 1 if k % 2 == 0 else -1]:
-            one.measure(run)
-            bar.update()
-    return timed, left_out
+    times: dict[Any, list[float]] = {name: [] for name in calls}
+    repeats: dict[Any, int] = {}
+    results: dict[Any, Any] = {}
+
+    def seconds(name: Any, count: int) -> float:
+        begin = clock()
+        for _ in range(count):
+            results[name] = calls[name]()
+        return (clock() - begin) / count
+
+    for k in range(rounds):
+        for name in list(calls)[:: 1 if k % 2 == 0 else -1]:
+            if not times[name]:
+                once = seconds(name, 1)
+                repeats[name] = ceil(shortest / max(once, 1e-6))
+                times[name].append(once if repeats[name] == 1 else seconds(name, repeats[name]))
+            elif times[name][0] <= patience:
+                times[name].append(seconds(name, repeats[name]))
+            done()
+    return times, results
+
+
+def compete(
+    contenders: Sequence[Contender],
+    exact: Answer,
+    place: str,
+    rounds: int,
+    read: Callable[[Any], Answer] = lambda result: Answer(*result),
+    **options: Any,
+) -> xr.Dataset:
+    """Times and errors of contenders.
+
+    Parameters
+    ----------
+    contenders : sequence of Contender
+    exact : Answer
+        That of the reference, in all cells.
+    place : str
+        Name of what :attr:`Answer.end` is the value of, such as ``"phi"``.
+    rounds : int
+    read : callable
+        Gives the :class:`Answer` in what a contender returns.
+    **options
+        As for :func:`alternate`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``contender`` and ``cell``, coordinates ``method`` and ``setting``, variables of
+        :data:`ringsweep.quantities.variables.PRECISION`. Cells that a contender does not run have NaN.
+    """
+    times, results = alternate({k: contender.run for k, contender in enumerate(contenders)}, rounds, **options)
+    per_run = [median(times[k]) / contender.lanes for k, contender in enumerate(contenders)]
+    found = xr.Dataset(
+        {"time_per_run": ("contender", per_run)},
+        coords={
+            "method": ("contender", [contender.method for contender in contenders], {"long_name": "method"}),
+            "setting": ("contender", [contender.setting for contender in contenders], {"long_name": "its setting"}),
+        },
+    )
+    answers = [read(results[k]) for k in range(len(contenders))]
+    if all(answer.steps is not None for answer in answers):
+        found["steps"] = "contender", [answer.steps for answer in answers]
+    each = [errors(answer, exact) for answer in answers]
+    for name in each[0]:
+        column = np.full((len(contenders), len(exact.end)), np.nan)
+        for row, one in zip(column, each, strict=True):
+            row[: len(one[name])] = one[name]
+        found[name] = ("contender", "cell"), column
+    return described(found, place)
+
+
+def errors(answer: Answer, exact: Answer) -> dict[str, NDArray[Any]]:
+    """Errors of an answer in each of its cells: infinite if the run failed, NaN if one of the two has no number."""
+    count = len(answer.end)
+    error, separation = abs(answer.end - exact.end[:count]), exact.separation[:count]
+    if answer.regime is not None and exact.regime is not None:
+        wrong = (answer.regime != exact.regime[:count]).any(axis=1)
+    elif np.isfinite(exact.separation).any():
+        wrong = (np.isfinite(answer.separation) != np.isfinite(separation)) | ~np.isfinite(answer.end)
+    else:
+        wrong = np.full(count, np.nan)
+    return {
+        "error_end": np.where(np.isfinite(error), error, np.inf),
+        "error_separation": abs(answer.separation - separation),
+        "regime_wrong": wrong,
+    }
+
+
+def described(ds: xr.Dataset, place: str) -> xr.Dataset:
+    """The dataset with attributes; of what is about the end in the words and the unit of the model's place."""
+    end = OUTCOMES[f"{place}_end"]
+    for name, data in ds.items():
+        variable = PRECISION[str(name)]
+        if str(name).endswith("error_end"):
+            words = variable.long_name.replace(OUTCOMES["phi_end"].long_name, end.long_name)
+            variable = replace(variable, long_name=words, unit=end.unit)
+        data.attrs = variable.attributes
+    return ds
+
+
+def judge(ds: xr.Dataset, target: float) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.bool_]]:
+    """Of each contender the number of wrong regimes, the largest error, and whether it meets the target.
+
+    Errors are those at the end and of the separation, plus the uncertainty of the reference if the dataset has it.
+    """
+    names = [name for name in ("error_end", "error_separation") if name in ds]
+    worst = np.fmax.reduce([(ds[name] + ds.get(f"reference_{name}", 0.0)).max("cell").values for name in names])
+    wrong = (ds["regime_wrong"] == 1).sum("cell").values
+    return wrong, worst, (wrong == 0) & (worst <= target)
+
+
+def fastest(ds: xr.Dataset, target: float, *methods: str) -> int | None:
+    """Number of the fastest contender, or of the fastest of these methods, that meets a target; None if none does."""
+    met = np.flatnonzero(judge(ds, target)[2] & (ds["method"].isin(methods).values if methods else True))
+    return int(met[np.argmin(ds["time_per_run"].values[met])]) if len(met) else None

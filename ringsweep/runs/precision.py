@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from statistics import median
+from time import get_clock_info, perf_counter, thread_time
 from typing import Any
 
 import numpy as np
@@ -18,18 +19,19 @@ from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Config, load
 from ringsweep.config.axes import COUNT
 from ringsweep.errors import InputError
-from ringsweep.models import Model, batch, model_of
+from ringsweep.models import batch, model_of
 from ringsweep.models.scene import LAW
 from ringsweep.quantities.flags import FAILED
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
-from ringsweep.quantities.variables import OUTCOMES, PRECISION, Variable
+from ringsweep.quantities.variables import PRECISION
 from ringsweep.runs.cells import coordinates, values_of_cells
-from ringsweep.runs.contenders import TimedMethod, contenders_for, setting_of, solver_yaml, time_methods
+from ringsweep.runs.contenders import Answer, Contender, compete, described, errors, fastest, judge
 from ringsweep.runs.executors import interruptible, progress_bar
 from ringsweep.solvers.certificate import agree
-from ringsweep.solvers.event import Event, Implicit
+from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.method import Result
+from ringsweep.solvers.rk4 import RK4
 from ringsweep.storage.provenance import attributes
 
 #: Default of the largest error allowed: rad or m at the end, s at separation.
@@ -41,6 +43,20 @@ ROUNDS = 3
 
 # Tolerances of the reference, and of the run from which its uncertainty follows.
 _TIGHTEST: dict[type, tuple[float, float]] = {Event: (1e-15, 1e-14), Implicit: (1e-11, 1e-10)}
+
+# The tightest is two digits above the tolerance of the reference.
+_TOLERANCES: dict[type, tuple[float, ...]] = {
+    Event: (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12),
+    Implicit: (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
+}
+
+_STEPS = tuple(10**k for k in range(2, 8))
+
+# Seconds that the runs of one setting may take with certificates.
+_BUDGET = 20.0
+
+# The time of the thread does not count other processes, but some systems measure it too coarsely.
+_clock = thread_time if get_clock_info("thread_time").resolution < 1e-4 else perf_counter
 
 _TARGET = Parameter("1", "target", lower=0.0, open_lower=True)
 
@@ -56,7 +72,7 @@ def precision(
     """Measure error against run time of the methods that take the friction law of a scene, and recommend a setting.
 
     The method that `auto` uses for the law, `event` or `implicit`, runs with a range of `rtol`, and `rk4` with five
-    decades of `steps`. Settings that would take longer than 10 s a round are left out and named. A setting meets the
+    decades of `steps`. Settings that would take longer than 20 s are left out and named. A setting meets the
     target if regime, motion and separating contact are right in every sampled cell, and if the errors of the state at
     the end and of the time of separation, plus the uncertainty of the reference, are at most `target`. The fastest of
     these settings is recommended.
@@ -114,7 +130,7 @@ def precision(
 def _measure(config: Config, target: float, cells: int, rounds: int, progress: bool) -> xr.Dataset:
     target = quantity(target, _TARGET, "target")
     cells, rounds = int(quantity(cells, COUNT, "cells")), int(quantity(rounds, COUNT, "rounds"))
-    scene = config.scene
+    scene, axes = config.scene, config.axes
     if config.sample is not None:
         raise InputError("sweep.sample", "precision measures the cells of a grid: leave sample out")
     if len(scene.structures) > 1:
@@ -124,153 +140,143 @@ def _measure(config: Config, target: float, cells: int, rounds: int, progress: b
             f"each of {', '.join(scene.structures)} needs methods and a reference of its own: give one law here",
         )
     structure = scene.structure
-    names = model_of(structure).columns(structure)
-    contenders, left_out = contenders_for(config)
-    best = type(contenders[0])
-    total = math.prod(config.axes.sizes.values())
+    model = model_of(structure)
+    names = model.columns(structure)
+    methods, left_out = _methods(config)
+    best = type(methods[0])
+    total = math.prod(axes.sizes.values())
     sample = np.arange(total)
     if cells < total:
         sample = np.sort(np.random.default_rng(0).choice(total, cells, replace=False))
-    sampled = batch(structure, values_of_cells(scene, config.axes, sample))
+    sampled = batch(structure, values_of_cells(scene, axes, sample))
 
-    def run(method: Any) -> Result:
+    def run(method: Any, certify: bool = False) -> Result:
         with readable_compile_errors():
-            return method.run(sampled, names)
+            return replace(method, certify=certify).run(sampled, names)
 
-    with progress_bar(2 + len(contenders) * (rounds + 1), progress) as bar:
-        tight, looser = (_run_one(bar, best(rtol=rtol, certify=False), run).rows for rtol in _TIGHTEST[best])
-        known = np.flatnonzero(agree(tight, looser, names))
-        if not len(known):
-            raise InputError(
-                "scene",
-                f"there is no reference to measure errors: in all of the {len(sample)} cells tried {best.name} fails, "
-                "or its two tightest runs disagree on the regime",
-            )
-        sampled = take(sampled, known)
-        timed, slow = time_methods(contenders, run, rounds, bar)
-        certified = [_run_one(bar, replace(one.method, certify=True), run) for one in timed]
+    tight, looser = (run(best(rtol=rtol)).rows for rtol in _TIGHTEST[best])
+    known = np.flatnonzero(agree(tight, looser, names))
+    if not len(known):
+        raise InputError(
+            "scene",
+            f"there is no reference to measure errors: in all of the {len(sample)} cells tried {best.name} fails, "
+            "or its two tightest runs disagree on the regime",
+        )
+    sampled, tight, looser = take(sampled, known), tight[known], looser[known]
 
-    dataset = _dataset(config, sample[known], timed, certified, tight[known], looser[known])
-    words = {"reference": solver_yaml(best(rtol=_TIGHTEST[best][0])), "sampled": f"{len(known)} of {total} cells"}
+    def answer(rows: NDArray[np.float64], steps: float | None = None) -> Answer:
+        number = dict(zip(names, rows.T, strict=True))
+        # The state at which a failed run stopped is no answer.
+        end = np.where(number["regime"] == FAILED, np.nan, number[f"{model.place}_end"])
+        separation = number.get("t_separation", np.full(len(rows), np.nan))
+        return Answer(end, separation, agree(rows, tight, names)[:, np.newaxis], steps)
+
+    with progress_bar(len(methods) * (rounds + 1), progress) as bar:
+        certified, slow = _certified(methods, run, bar.update)
+        methods = list(certified)
+        dataset = compete(
+            [Contender(method.name, _setting(method), partial(run, method), len(known)) for method in methods],
+            answer(tight),
+            model.place,
+            rounds,
+            lambda result: answer(result.rows, result.steps.mean()),
+            clock=_clock,
+            done=bar.update,
+        )
+    passed = np.array([one.certified for one, _ in certified.values()])
+    # With certificates a method may replace an answer by that of a finer run: it does not certify the first.
+    replaced = [agree(one.rows, tight, names) for one, _ in certified.values()] == dataset["regime_wrong"].values
+    dataset["flagged"] = ("contender", "cell"), ~passed | replaced
+    for name in ("error_end", "error_separation"):
+        dataset[f"reference_{name}"] = "cell", errors(answer(looser), answer(tight))[name]
+    if "t_separation" not in names:
+        dataset = dataset.drop_vars(["error_separation", "reference_error_separation"])
+    dataset = described(dataset.map(lambda data: data.astype(PRECISION[data.name].dtype)), model.place)
+
+    solvers = [solver_yaml(method) for method in methods]
+    values = values_of_cells(scene, axes, sample[known])
+    law = [structure.law] * len(known)
+    along = {path: ("cell", law if path == LAW else values[path]) for path in axes.columns}
+    label = "number of the cell in the sweep, last dimension fastest"
+    dataset = dataset.assign_coords(
+        solver=("contender", solvers, {"long_name": "text under solver in a configuration"}),
+        cell=("cell", sample[known], {"long_name": label}),
+        **coordinates(scene, along),
+    )
+    wrong, worst, _ = judge(dataset, target)
+    chosen = fastest(dataset, target)
+    found = "closest" if chosen is None else "recommended"
+    if chosen is None:
+        chosen = int(np.lexsort([worst, wrong])[0])
+    seconds = certified[methods[chosen]][1] / len(known)
+    words = {
+        "target": target,
+        "reference": solver_yaml(best(rtol=_TIGHTEST[best][0])),
+        "sampled": f"{len(known)} of {total} cells",
+        found: solvers[chosen],
+        "certificate_cost": seconds / dataset["time_per_run"].values[chosen],
+    }
     if dropped := len(sample) - len(known):
         words["sampled"] += (
             f"; {dropped} more were drawn, but have no reference: its two tightest runs disagree, or fail"
         )
     if left_out or slow:
         words["left_out"] = "; ".join([*left_out, *slow])
-    dataset = dataset.assign_attrs({"target": target, **words})
-
-    chosen, met = _choose(dataset)
-    plain, with_certificate = (TimedMethod(replace(timed[chosen].method, certify=certify)) for certify in (False, True))
-    for k in range(rounds):
-        for one in (plain, with_certificate)[:: 1 if k % 2 == 0 else -1]:
-            one.measure(run)
-    cost = median(b / a for a, b in zip(plain.seconds, with_certificate.seconds, strict=True))
-    names_of_solvers = dataset["solver"].values.tolist()
-    found: dict[str, Any] = {"recommended" if met else "closest": names_of_solvers[chosen], "certificate_cost": cost}
-    configured = solver_yaml(config.solver.resolved(structure))
-    if configured in names_of_solvers:
-        found["configured"] = configured
-    return dataset.assign_attrs(found)
+    if (configured := solver_yaml(config.solver.resolved(structure))) in solvers:
+        words["configured"] = configured
+    return dataset.assign_attrs(attributes(config) | words)
 
 
-def _run_one(bar: Any, method: Any, run: Callable[[Any], Result]) -> Result:
-    result = run(method)
-    bar.update()
-    return result
+def _methods(config: Config) -> tuple[list[Any], list[str]]:
+    """Methods with settings, from cheap to expensive; and why others are left out, in words."""
+    structure, configured = config.scene.structure, config.solver
+    best: Any = type(Auto().resolved(structure))
+    tolerances = {*_TOLERANCES[best], best.rtol} | ({configured.rtol} if isinstance(configured, best) else set())
+    limit = getattr(configured, "max_steps", best.max_steps)
+    found = [best(rtol=rtol, max_steps=limit) for rtol in sorted(tolerances, reverse=True)]
+    steps = {*_STEPS} | ({configured.steps} if isinstance(configured, RK4) else set())
+    fixed = [RK4(steps=n) for n in sorted(steps)]
+    try:
+        fixed[0].check(structure)
+    except InputError as error:
+        return found, [error.problem]
+    return found + fixed, []
 
 
-def _errors(rows: NDArray[np.float64], reference: NDArray[np.float64], model: Model) -> dict[str, NDArray[np.float64]]:
-    """Errors in each cell, shape ``(cells,)``: infinite if the run failed, NaN if one of the two runs has no number."""
-    names = model.outcomes
-    failed = rows[:, names.index("regime")] == FAILED
-    found = {}
-    for name, outcome in {"error_end": f"{model.place}_end", "error_separation": "t_separation"}.items():
-        if outcome in names:
-            column = names.index(outcome)
-            found[name] = np.abs(rows[:, column] - reference[:, column])
-    found["error_end"] = np.where(failed, np.inf, found["error_end"])
-    return found
+def _certified(
+    methods: Sequence[Any], run: Callable[[Any, bool], Result], done: Callable[[], Any]
+) -> tuple[dict[Any, tuple[Result, float]], list[str]]:
+    """Results with certificates and their run times, s, by method; and the settings that would take too long."""
+    found: dict[Any, tuple[Result, float]] = {}
+    left_out = []
+    latest: dict[type, float] = {}
+    for method in methods:
+        steps = getattr(method, "steps", 1)
+        if type(method) not in latest:
+            # The first run may compile.
+            run(method, True)
+        elif (expected := latest[type(method)] * steps) > _BUDGET:
+            left_out.append(f"{method.name}, {_setting(method)} (about {expected:.0f} s; {_BUDGET:g} s are allowed)")
+            continue
+        begin = _clock()
+        result = run(method, True)
+        found[method] = result, _clock() - begin
+        latest[type(method)] = found[method][1] / steps
+        done()
+    return found, left_out
 
 
-def _dataset(
-    config: Config,
-    sample: NDArray[np.intp],
-    timed: Sequence[TimedMethod],
-    certified: Sequence[Result],
-    tight: NDArray[np.float64],
-    looser: NDArray[np.float64],
-) -> xr.Dataset:
-    """Run times, errors and flags of the contenders in the cells with these numbers, labelled."""
-    scene, axes = config.scene, config.axes
-    model = model_of(scene.structure)
-    names = model.outcomes
-    columns: dict[str, tuple[tuple[str, ...], Any]] = {
-        "time_per_run": (("contender",), [median(one.seconds) / len(sample) for one in timed]),
-        "steps": (("contender",), [one.result.steps.mean() for one in timed]),
+def _setting(method: Any) -> str:
+    """The tolerance or the number of steps of a method, as text."""
+    return f"{method.steps} steps" if isinstance(method, RK4) else f"rtol {method.rtol!r}"
+
+
+def solver_yaml(method: Any) -> str:
+    """Text under ``solver`` in a configuration for this method: its setting, and options that are not defaults."""
+    options = {"steps": method.steps} if isinstance(method, RK4) else {"rtol": method.rtol}
+    options |= {
+        option.name: getattr(method, option.name)
+        for option in dataclasses.fields(method)
+        if option.name not in (*options, "certify") and getattr(method, option.name) != option.default
     }
-    each = [_errors(one.result.rows, tight, model) for one in timed]
-    for name in each[0]:
-        columns[name] = ("contender", "cell"), [errors[name] for errors in each]
-    # With certificates a method may replace an answer by that of a finer run: it does not certify the first.
-    passed = [
-        certificate.certified & agree(one.result.rows, certificate.rows, names)
-        for one, certificate in zip(timed, certified, strict=True)
-    ]
-    right = [agree(one.result.rows, tight, names) for one in timed]
-    columns["regime_wrong"] = ("contender", "cell"), ~np.array(right)
-    columns["flagged"] = ("contender", "cell"), ~np.array(passed)
-    columns |= {f"reference_{name}": (("cell",), error) for name, error in _errors(looser, tight, model).items()}
-
-    values = values_of_cells(scene, axes, sample)
-    law = [scene.structure.law] * len(sample)
-    along = {path: ("cell", law if path == LAW else values[path]) for path in axes.columns}
-    return xr.Dataset(
-        {
-            name: (dims, np.asarray(column, dtype=PRECISION[name].dtype), _described(name, model).attributes)
-            for name, (dims, column) in columns.items()
-        },
-        coords={
-            "method": ("contender", [one.method.name for one in timed], {"long_name": "method"}),
-            "setting": ("contender", [setting_of(one.method) for one in timed], {"long_name": "its setting"}),
-            "solver": (
-                "contender",
-                [solver_yaml(one.method) for one in timed],
-                {"long_name": "text under solver in a configuration"},
-            ),
-            "cell": ("cell", sample, {"long_name": "number of the cell in the sweep, last dimension fastest"}),
-            **coordinates(scene, along),
-        },
-    ).assign_attrs(attributes(config))
-
-
-def _described(name: str, model: Model) -> Variable:
-    """Variable of the dataset; where it is about the end, in the words and the unit of the model's place."""
-    variable, place = PRECISION[name], OUTCOMES[f"{model.place}_end"]
-    if not name.endswith("error_end"):
-        return variable
-    words = variable.long_name.replace(OUTCOMES["phi_end"].long_name, place.long_name)
-    return replace(variable, long_name=words, unit=place.unit)
-
-
-def error_bounds(ds: xr.Dataset) -> NDArray[np.float64]:
-    """Errors plus the uncertainty of the reference, shape ``(contender, cell)``."""
-    bounds = (ds["error_end"] + ds["reference_error_end"]).values
-    if "error_separation" in ds:
-        bounds = np.fmax(bounds, (ds["error_separation"] + ds["reference_error_separation"]).values)
-    return np.asarray(bounds)
-
-
-def wrong_and_worst(ds: xr.Dataset) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.bool_]]:
-    """Of each contender the number of wrong regimes, the largest error, and whether it meets the target."""
-    wrong, worst = (ds["regime_wrong"] == 1).sum("cell").values, error_bounds(ds).max(axis=1)
-    return wrong, worst, (wrong == 0) & (worst <= ds.attrs["target"])
-
-
-def _choose(ds: xr.Dataset) -> tuple[int, bool]:
-    """The fastest contender that meets the target, or else the one that comes closest; and whether it meets it."""
-    wrong, worst, meets = wrong_and_worst(ds)
-    met = np.flatnonzero(meets)
-    if len(met):
-        return int(met[np.argmin(ds["time_per_run"].values[met])]), True
-    return int(np.lexsort([worst, wrong])[0]), False
+    return ", ".join([f"method: {method.name}", *(f"{name}: {value!r}" for name, value in options.items())])
