@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -67,9 +69,29 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'ringsweep' has no attribute {name!r}")
 
 
-# Xarray is slow to import too. Where it is imported already, `ds.ringsweep` is there at once.
+class _AfterXarray:
+    """Adds ``ds.ringsweep`` to datasets once somebody imports xarray, which is slow to import too."""
+
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        if fullname != "xarray":
+            return None
+        sys.meta_path.remove(self)
+        spec = find_spec(fullname)
+        if spec is not None and spec.loader is not None:
+            load = spec.loader.exec_module
+
+            def load_and_register(module: Any) -> None:
+                load(module)
+                import_module("ringsweep.accessor")
+
+            spec.loader.exec_module = load_and_register  # type: ignore[method-assign]
+        return spec
+
+
 if "xarray" in sys.modules:
     import_module("ringsweep.accessor")
+else:
+    sys.meta_path.insert(0, _AfterXarray())
 
 
 def __dir__() -> list[str]:

@@ -1,8 +1,4 @@
-"""The functions that take a dataset, as ``ds.ringsweep`` of xarray.
-
-``import ringsweep`` after ``import xarray`` registers it, and so does any use of :mod:`ringsweep`. In doubt,
-``import ringsweep.accessor``.
-"""
+"""The functions that take a dataset, as ``ds.ringsweep`` of xarray: there once ringsweep and xarray are imported."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def test_map_has_the_title_of_the_function(ds):
     assert ds.ringsweep.map("t_end").axes[-1].get_ylabel() == plots.regime_map(ds, var="t_end").axes[-1].get_ylabel()
 
 
-@pytest.mark.parametrize("imports", ["ringsweep.accessor, xarray as xr", "xarray as xr, ringsweep"])
+@pytest.mark.parametrize("imports", ["ringsweep, xarray as xr", "xarray as xr, ringsweep"])
 def test_accessor_is_there_for_a_file_that_xarray_alone_has_opened(imports):
     code = f"import {imports}; print(xr.Dataset().ringsweep.words.__name__)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "words"
