@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ringsweep.config.friction import friction_law
+    from ringsweep.config.own import friction_law
     from ringsweep.errors import InputError
     from ringsweep.quantities.variables import words
     from ringsweep.runs.attractors import attractors
@@ -47,7 +47,7 @@ _MODULES = {
     "threshold": "runs.thresholds",
     "fit": "runs.fit",
     "uncertainty_exponent": "runs.boundaries",
-    "friction_law": "config.friction",
+    "friction_law": "config.own",
     "verify": "storage.netcdf",
     "words": "quantities.variables",
     "InputError": "errors",

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 import ringsweep
-from ringsweep.config.motion import own_drive, own_force
+from ringsweep.config.own import own_drive, own_force
 from ringsweep.config.tables import TABLES
 from ringsweep.models import parameters
 from ringsweep.models.scene import Structure

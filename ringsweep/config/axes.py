@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.friction import laws_with
+from ringsweep.config.own import laws_with
 from ringsweep.config.scene import sweepable
 from ringsweep.config.sections import MAX_LENGTH, check_keys, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document

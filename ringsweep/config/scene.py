@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
 from math import pi
-from typing import Any, NamedTuple
+from types import MappingProxyType
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ringsweep.config.friction import (
+from ringsweep.config.own import (
     FORMULA,
+    TABLE_LAW,
     keep_definitions,
     keys_of,
     law_of_curve,
     laws_with,
+    own_drive,
+    own_force,
     own_laws,
     read_curve,
 )
-from ringsweep.config.friction import TABLE as TABLE_LAW
-from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
-from ringsweep.config.motion import own_drive, own_force
 from ringsweep.config.record import read_record
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion, warn_once
 from ringsweep.config.tables import TABLES, read_samples
@@ -77,39 +75,29 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     model = choose(MODELS, scene, "scene.model", "model")
     exponent, section = read_record(doc.tree.get("record", {}), model)
     zones = _zones(scene)
-    friction = _read_friction(doc, scene, model, laws)
+    names, own, curve = _read_friction(doc, scene, model, laws)
     moved = _read_motion(scene, model, swept)
-    leaves = _read_leaves(scene, model, zones, friction, moved)
-    if not friction.names:
+    # Name a misspelt key, rather than the key that is missing because of it.
+    keys = _Keys(model, dict.fromkeys([*law_choice(model, own).names]), own, zones or ("zones.0",), moved)
+    leaves = dict(keys.leaves(scene, names))
+    if not names:
         section_of(scene, "friction", "scene.")
-        known_laws = law_choice(model, friction.own).names
-        raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws))
+        raise InputError(f"scene.{LAW}", f"missing: name a friction law: {', '.join(law_choice(model, own).names)}")
     if section is not None:
-        known = {**LAWS, **friction.own}
-        section = section._replace(deflections=any(family_of(known[law]) is Dynamic for law in friction.names))
-    moved = replace(moved, exponent=exponent, section=section)
-    moved = replace(moved, arcs=_arcs(scene, zones, leaves), **_read_tables(doc, scene, moved))
+        section = section._replace(deflections=any(family_of({**LAWS, **own}[law]) is Dynamic for law in names))
+    arcs = _arcs(scene, zones, leaves)
+    moved = replace(moved, exponent=exponent, section=section, arcs=arcs, **_read_tables(doc, scene, moved))
     structures = {
-        law: replace(moved, law=law, own_law=friction.own.get(law), curve=friction.curve if law == TABLE_LAW else None)
-        for law in friction.names
+        law: replace(moved, law=law, own_law=own.get(law), curve=curve if law == TABLE_LAW else None) for law in names
     }
     values = _read_numbers(structures, leaves, swept)
     _warn_of_unused_numbers(structures, leaves)
     numbers = numbers_of(structures)
-    lengths = {path: values[path] for path, parameter in numbers.items() if parameter.unit == "m" and path in values}
-    _warn_of_lengths(lengths)
+    _warn_of_lengths({path: values[path] for path, p in numbers.items() if p.unit == "m" and path in values})
     for path, parameter in numbers.items():
         if path in leaves:
             warn_of_plain_angle(path, leaves[path], parameter)
     return Scene(structures, values, scene)
-
-
-class _Friction(NamedTuple):
-    """The section ``friction``: laws that are used, types of those that the configuration defines, a measured curve."""
-
-    names: list[str]
-    own: dict[str, type]
-    curve: tuple[NDArray[np.float64], NDArray[np.float64]] | None
 
 
 def _zones(scene: dict[str, Any]) -> tuple[str, ...]:
@@ -135,7 +123,10 @@ def _arcs(scene: dict[str, Any], zones: tuple[str, ...], leaves: Collection[str]
     return ()
 
 
-def _read_friction(doc: Document, scene: dict[str, Any], model: str, laws: tuple[str, Any] | None) -> _Friction:
+def _read_friction(
+    doc: Document, scene: dict[str, Any], model: str, laws: tuple[str, Any] | None
+) -> tuple[list[str], dict[str, type], Any]:
+    """Laws that are used, types of those that the configuration or the process defines, and a measured curve."""
     section = section_of(scene, "friction", "scene.") if "friction" in scene else {}
     own = own_laws(section)
     known = law_choice(model, own)
@@ -152,14 +143,14 @@ def _read_friction(doc: Document, scene: dict[str, Any], model: str, laws: tuple
         own[TABLE_LAW] = law_of_curve(curve)
     keep_definitions(section, names)
     # Laws of this process too: other processes know only what the structure holds.
-    return _Friction(names, own | own_laws(section), curve)
+    return names, own | own_laws(section), curve
 
 
 def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> Structure:
     """Structure without a friction law: the drive, what formulas move the drive and the body, and impact."""
     drive = "none"
     if "drive" in scene:
-        names = dict.fromkeys([*DRIVES, FORMULA_DRIVE])
+        names = dict.fromkeys([*DRIVES, FORMULA])
         drive = choose(names, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
     impact = model in WITH_IMPACT and ("impact" in scene or any(path.startswith("impact.") for path in swept))
     found = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})), impact=impact)
@@ -178,27 +169,6 @@ def _read_tables(doc: Document, scene: dict[str, Any], moved: Structure) -> dict
         "table": read_samples(doc, scene["drive"], "drive") if moved.drive == "table" else None,
         "force": read_samples(doc, scene["force"], "force") if measured else None,
     }
-
-
-def _read_leaves(
-    scene: dict[str, Any], model: str, zones: tuple[str, ...], friction: _Friction, moved: Structure
-) -> dict[str, Any]:
-    """Path and value of every leaf of the scene."""
-    # Name a misspelt key, rather than the key that is missing because of it.
-    laws = dict.fromkeys([*MODELS[model].laws, *friction.own, FORMULA, TABLE_LAW])
-    paths = _Paths(_all_paths(model, zones or ("zones.0",), laws, friction.own, moved))
-
-    def unknown(section: str, key: str) -> InputError:
-        hint = _belongs_elsewhere(section, key, paths, model)
-        if hint is None:
-            known = paths.children[section]
-            if friction.names:
-                near = _Paths(_all_paths(model, zones[:1] or ("zones.0",), friction.names, friction.own, moved))
-                known = near.children.get(section, known)
-            hint = suggestion(key, known)
-        return InputError(".".join(filter(None, ("scene", section, key))), f"unknown key{hint}")
-
-    return dict(_leaves(scene, "", paths, unknown))
 
 
 def _read_numbers(
@@ -247,26 +217,6 @@ def _warn_of_unused_numbers(structures: Mapping[str, Structure], leaves: Collect
             warn_once("scene.%s is not used: %s has no such parameter%s", path, law, laws_with(path))
 
 
-def _belongs_elsewhere(section: str, key: str, paths: _Paths, model: str) -> str | None:
-    """End of the message about an unknown key that a comma has made, or that is known at another place."""
-    if key[:1].isdigit():
-        return ": a comma ends a value in YAML, write a decimal point"
-    if section.startswith("zone") and key in ("from", "to", "start", "end", "width"):
-        return ": a zone has a center, which is (from + to)/2, and a half_angle, which is (to - from)/2"
-    if not section and key in ("solver", "sweep", "record"):
-        return f": the section `{key}` stands beside `scene`, not in it: take away its indentation"
-    if len(key) > 1 and any(str(own).startswith(key) for own in paths.children.get(section, ())):
-        return None
-    if places := paths.ending_with(key):
-        return f"; did you mean {places}?"
-    for other in MODELS:
-        known = _Paths(_all_paths(other, ("zones.0",), dict.fromkeys(MODELS[other].laws), {}))
-        if other != model and (key in known.children.get(section, ()) or known.ending_with(key)):
-            places = known.ending_with(key) or f"`{section}.{key}`".replace("`.", "`")
-            return f": model {other} has {places}, this is model {model}"
-    return None
-
-
 def _warn_of_lengths(lengths: Mapping[str, float]) -> None:
     """Warn of lengths so different that a unit may be wrong."""
     given = sorted((abs(value), path) for path, value in lengths.items() if value)
@@ -306,7 +256,7 @@ def law_choice(model: str, own: Mapping[str, type]) -> Choice:
 def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...]:
     """Paths of a scene that are no numeric parameters."""
     sections = ["drive"] if drive == "table" else []
-    formulas = ["drive.theta"] if drive == FORMULA_DRIVE else []
+    formulas = ["drive.theta"] if drive == FORMULA else []
     if _takes_force(model):
         sections.append("force")
         formulas.append("force.formula")
@@ -318,36 +268,43 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...
     )
 
 
-def _all_paths(
-    model: str,
-    zones: tuple[str, ...],
-    laws: Collection[str],
-    own: Mapping[str, type],
-    moved: Structure | None = None,
-) -> list[str]:
-    """Every path that a scene of this model can have, under some laws and all drives."""
-    paths = dict.fromkeys(_structural(model, "table", laws))
-    known = [law for law in laws if law in MODELS[model].laws or law in own]
-    # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take a minute.
-    kinds = [*product(known, ("none",), ((), ("zone",), zones)), *product(known[:1], DRIVES, ((),))]
-    for law, drive, arcs in kinds:
-        structure = Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT)
-        paths |= dict.fromkeys(_paths_under(structure, model_of(structure), structure.law_type, structure.drive_type))
-    if moved is not None:
-        paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))
-    return list(paths)
-
-
 @lru_cache(maxsize=4096)
 def _paths_under(structure: Structure, *registered: Any) -> tuple[str, ...]:
     """Paths of the numbers of a scene, for as long as the same types are registered under its names."""
     return tuple(parameters(structure))
 
 
-class _Paths:
-    """Dotted paths, and the keys below each section."""
+class _Keys:
+    """Keys that a scene of a model can have, under some laws and all drives.
 
-    def __init__(self, paths: list[str]):
+    Attributes
+    ----------
+    known : set of str
+        Paths of all values.
+    children : dict of str to dict
+        Keys below the path of each section.
+    """
+
+    def __init__(
+        self,
+        model: str,
+        laws: Collection[str],
+        own: Mapping[str, type] = MappingProxyType({}),
+        zones: tuple[str, ...] = ("zones.0",),
+        moved: Structure | None = None,
+    ):
+        self.model, self.moved, self.own, self.zones = model, moved, own, zones
+        paths = dict.fromkeys(_structural(model, "table", laws))
+        known = [law for law in laws if law in MODELS[model].laws or law in own]
+        # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take long.
+        for law, drive, arcs in (
+            *product(known, ("none",), ((), ("zone",), zones)),
+            *product(known[:1], DRIVES, ((),)),
+        ):
+            one = Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT)
+            paths |= dict.fromkeys(_paths_under(one, model_of(one), one.law_type, one.drive_type))
+        if moved is not None:
+            paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))
         self.known = set(paths)
         self.children: dict[str, dict[str, None]] = {}
         for path in paths:
@@ -356,27 +313,45 @@ class _Paths:
                 self.children.setdefault(parent, {})[key] = None
                 path = parent
 
+    def leaves(self, node: Any, laws: Collection[str], path: str = "") -> Iterator[tuple[str, Any]]:
+        """Path and value of every leaf of a scene with some laws, below a path that ends with a dot."""
+        section = path.rstrip(".")
+        where, children = f"scene.{path}".rstrip("."), self.children[section]
+        items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else None
+        if items is None:
+            raise InputError(where, f"a section is expected, got {show(node)} (known keys: {', '.join(children)})")
+        for key, value in items:
+            # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
+            if str(key) not in children:
+                raise InputError(
+                    f"{where}.{key}".rstrip("."), f"unknown key{self.hint(path.rstrip('.'), str(key), laws)}"
+                )
+            if path + str(key) in self.known:
+                yield f"{path}{key}", value
+            else:
+                yield from self.leaves(value, laws, f"{path}{key}.")
+
+    def hint(self, section: str, key: str, laws: Collection[str]) -> str:
+        """End of the message about an unknown key: a comma has made it, it belongs elsewhere, or is misspelt."""
+        if key[:1].isdigit():
+            return ": a comma ends a value in YAML, write a decimal point"
+        if section.startswith("zone") and key in ("from", "to", "start", "end", "width"):
+            return ": a zone has a center, which is (from + to)/2, and a half_angle, which is (to - from)/2"
+        if not section and key in ("solver", "sweep", "record"):
+            return f": the section `{key}` stands beside `scene`, not in it: take away its indentation"
+        if len(key) < 2 or not any(str(own).startswith(key) for own in self.children.get(section, ())):
+            if places := self.ending_with(key):
+                return f"; did you mean {places}?"
+            for other in MODELS:
+                keys = _Keys(other, dict.fromkeys(MODELS[other].laws))
+                places = keys.ending_with(key)
+                if other != self.model and (places or key in keys.children.get(section, ())):
+                    places = places or f"`{section}.{key}`".replace("`.", "`")
+                    return f": model {other} has {places}, this is model {self.model}"
+        near = _Keys(self.model, laws, self.own, self.zones[:1], self.moved) if laws else self
+        return suggestion(key, near.children.get(section, self.children[section]))
+
     def ending_with(self, key: str) -> str:
         """Paths whose last key is `key`, as text; those of a list of zones are left out."""
         found = [path for path in self.known if path.rpartition(".")[2] == key and not path.startswith("zones.")]
         return " or ".join(f"`{path}`" for path in sorted(found))
-
-
-def _leaves(
-    node: Any, path: str, paths: _Paths, unknown: Callable[[str, str], InputError]
-) -> Iterator[tuple[str, Any]]:
-    """Path and value of every leaf below `node`; `unknown` makes the error about a section and a key that it lacks."""
-    where = f"scene.{path}".rstrip(".")
-    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else None
-    children = paths.children[path.rstrip(".")]
-    if items is None:
-        raise InputError(where, f"a section is expected, got {show(node)} (known keys: {', '.join(children)})")
-    for key, value in items:
-        full = f"{path}{key}"
-        # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
-        if str(key) not in children:
-            raise unknown(path.rstrip("."), str(key))
-        if full in paths.known:
-            yield full, value
-        else:
-            yield from _leaves(value, f"{full}.", paths, unknown)

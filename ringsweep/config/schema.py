@@ -11,9 +11,7 @@ from typing import Any
 
 from ringsweep.config.axes import COUNT
 from ringsweep.config.follow import DIRECTIONS
-from ringsweep.config.friction import FORMULA
-from ringsweep.config.friction import TABLE as TABLE_LAW
-from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
+from ringsweep.config.own import FORMULA, TABLE_LAW
 from ringsweep.config.record import INSTANTS, KEEP, PERIOD
 from ringsweep.config.refine import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
@@ -61,9 +59,7 @@ def schema() -> dict[str, Any]:
             "friction.at_rest": _at_rest(),
             "friction.v": _list(_number(TABLES["friction"]["v"])),
             "friction.file": _text("CSV file with columns v (m/s), mu"),
-            "drive.law": _names(
-                DRIVES, "how the ring is driven", {FORMULA_DRIVE: "A formula of the time, under theta"}
-            ),
+            "drive.law": _names(DRIVES, "how the ring is driven", {FORMULA: "A formula of the time, under theta"}),
             "initial.from": _text("result file of the run on the belt that goes on"),
             "drive.file": _text("CSV file with columns t (s), theta (rad)"),
             "force.file": _text("CSV file with columns t (s), force (N)"),

@@ -1,9 +1,9 @@
-"""Friction laws that a configuration defines: by a formula, or by a table of a measured curve."""
+"""Friction laws, drives and forces that a configuration defines, by a formula or by a table of measured friction."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,17 +13,19 @@ from ringsweep.config.sections import check_keys
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
+from ringsweep.models import MODELS
+from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, TRAITS, add_law, laws
-from ringsweep.physics.friction.formula import FormulaError
+from ringsweep.physics.friction.formula import FRICTION, FormulaError
 from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.quantities.parameters import declared
 from ringsweep.quantities.units import show
 
-#: Name of the law that the section ``friction`` itself defines by the keys ``mu`` and ``at_rest``.
+#: Name of the law that the section ``friction`` defines by ``mu`` and ``at_rest``, and of the drive by ``theta``.
 FORMULA = "formula"
 
 #: Name of the law that is a table of measured friction.
-TABLE = "table"
+TABLE_LAW = "table"
 
 # Laws that a Python session has defined.
 _REGISTERED: dict[str, Definition] = {}
@@ -70,7 +72,7 @@ def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:
     if not _may_name(name):
         raise InputError("friction_law", f"{show(name)} cannot be the name of a law: choose another name")
     definition = Definition(mu, at_rest)
-    law = _defined(definition, "friction_law")
+    law = _law(definition, "friction_law")
     LAWS.pop(name, None)
     add_law(name, law, TRAITS[law])
     _REGISTERED[name] = definition
@@ -79,7 +81,7 @@ def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:
 def _may_name(name: object) -> bool:
     """Whether a law of a user may have a name."""
     free = name not in LAWS or name in _REGISTERED
-    return isinstance(name, str) and name != "" and name not in (FORMULA, TABLE) and free
+    return isinstance(name, str) and name not in ("", FORMULA, TABLE_LAW) and free
 
 
 def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
@@ -90,29 +92,26 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
     InputError
         If a definition is wrong.
     """
-    found = {}
-    given = friction.get("laws", {})
+    where, found, given = "scene.friction.laws", {}, friction.get("laws", {})
     if not isinstance(given, Mapping):
-        raise InputError(
-            "scene.friction.laws", f"a section with a name and a formula of each law is expected, got {show(given)}"
-        )
+        raise InputError(where, f"a section with a name and a formula of each law is expected, got {show(given)}")
     for name, section in given.items():
-        path = f"scene.friction.laws.{name}"
+        path = f"{where}.{name}"
         if not isinstance(section, Mapping) or "mu" not in section:
             raise InputError(path, "a section with the key mu is expected, and at_rest for a law that holds at rest")
         check_keys(section, ("mu", "at_rest"), path)
         if not _may_name(name):
             raise InputError(path, f"{show(name)} cannot be the name of a law: choose another name")
-        found[name] = _defined(Definition(section["mu"], section.get("at_rest")), path)
-    if "mu" in friction and friction.get("law") != TABLE:
-        found[FORMULA] = _defined(Definition(friction["mu"], friction.get("at_rest")), "scene.friction")
+        found[name] = _law(Definition(section["mu"], section.get("at_rest")), path)
+    if "mu" in friction and friction.get("law") != TABLE_LAW:
+        found[FORMULA] = _law(Definition(friction["mu"], friction.get("at_rest")), "scene.friction")
     return found
 
 
 def keys_of(laws: Collection[str]) -> tuple[str, ...]:
     """Keys of the section ``friction`` that define some laws."""
     of_formula, of_table = ("mu", "at_rest"), ("file", *TABLES["friction"])
-    return ("laws", *(of_formula if FORMULA in laws else ()), *(of_table if TABLE in laws else ()))
+    return ("laws", *(of_formula if FORMULA in laws else ()), *(of_table if TABLE_LAW in laws else ()))
 
 
 def read_curve(doc: Document, friction: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -134,18 +133,6 @@ def law_of_curve(curve: tuple[NDArray[np.float64], NDArray[np.float64]]) -> type
     return laws.Table if curve[1][0] > 0.0 else laws.SmoothTable
 
 
-def _defined(definition: Definition, path: str) -> type:
-    if not isinstance(definition.mu, str):
-        raise InputError(
-            f"{path}.mu", f"a formula such as mu_k + (mu_s - mu_k)*exp(-v/v_s) is expected, got {show(definition.mu)}"
-        )
-    try:
-        return define(definition)
-    except FormulaError as error:
-        quoted = definition.at_rest if error.key == "at_rest" else definition.mu
-        raise InputError(f"{path}.{error.key}", f"{show(quoted)}: {error}") from None
-
-
 def keep_definitions(friction: dict[str, Any], names: list[str]) -> None:
     """Put the formulas of laws that this process has defined into the section, so that a file contains them."""
     for name in names:
@@ -153,3 +140,51 @@ def keep_definitions(friction: dict[str, Any], names: list[str]) -> None:
             definition = dataclasses.asdict(_REGISTERED[name])
             kept = {key: value for key, value in definition.items() if value is not None}
             friction["laws"] = {**friction.get("laws", {}), name: kept}
+
+
+def own_drive(model: str, drive: Mapping[str, Any]) -> type | None:
+    """Type of the drive if the section ``drive`` has the formula ``theta``.
+
+    Raises
+    ------
+    InputError
+        If the formula is missing or wrong.
+    """
+    if drive.get("law") != FORMULA:
+        return None
+    if "theta" not in drive:
+        raise InputError("scene.drive.theta", "missing: the formula of the motion, such as A*sin(2*pi*f*t)")
+    texts = {"mu": ("scene.drive.theta", drive["theta"])}
+    return _defined(lambda: drives.define(drive["theta"], MODELS[model].drive_unit), texts)
+
+
+def own_force(force: Any) -> type | None:
+    """Type of the force on the body if the section ``force`` has a ``formula``.
+
+    Raises
+    ------
+    InputError
+        If the formula is wrong, or if a table stands beside it.
+    """
+    if not isinstance(force, Mapping) or "formula" not in force:
+        return None
+    for key in (*TABLES["force"], "file", "interpolate"):
+        if key in force:
+            raise InputError(f"scene.force.{key}", "cannot stand beside a formula: give one of them")
+    return _defined(lambda: drives.define(force["formula"], "N"), {"mu": ("scene.force.formula", force["formula"])})
+
+
+def _law(definition: Definition, path: str) -> type:
+    if not isinstance(definition.mu, str):
+        raise InputError(f"{path}.mu", f"a formula such as {FRICTION.example} is expected, got {show(definition.mu)}")
+    texts = {"mu": (f"{path}.mu", definition.mu), "at_rest": (f"{path}.at_rest", definition.at_rest)}
+    return _defined(lambda: define(definition), texts)
+
+
+def _defined(make: Callable[[], type], texts: Mapping[str, tuple[str, Any]]) -> type:
+    """What a definition makes; an error is located by path and text of the key that is wrong."""
+    try:
+        return make()
+    except FormulaError as error:
+        path, text = texts[error.key]
+        raise InputError(path, f"{show(text)}: {error}") from None
