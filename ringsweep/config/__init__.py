@@ -1,38 +1,20 @@
 """Configurations: from YAML text to a validated scene, axes and solver in SI units."""
 
 from ringsweep.compile.cache import OWN_FILES
-from ringsweep.config.axes import Axes
-from ringsweep.config.configuration import (
-    Config,
-    Setting,
-    as_written,
-    assembled,
-    load,
-    read_axes,
-    read_scene,
-    tell_unit,
-    with_refine,
-    with_values,
-)
+from ringsweep.config.axes import Axes as Axes
+from ringsweep.config.configuration import Config as Config
+from ringsweep.config.configuration import Setting as Setting
+from ringsweep.config.configuration import as_written as as_written
+from ringsweep.config.configuration import assembled as assembled
+from ringsweep.config.configuration import load as load
+from ringsweep.config.configuration import read_axes as read_axes
+from ringsweep.config.configuration import read_scene as read_scene
+from ringsweep.config.configuration import tell_unit as tell_unit
+from ringsweep.config.configuration import with_refine as with_refine
+from ringsweep.config.configuration import with_values as with_values
 from ringsweep.config.own_files import load_own_files
-from ringsweep.config.scene import sweepable
-from ringsweep.config.solver import read_solver
-
-__all__ = [
-    "Axes",
-    "Config",
-    "Setting",
-    "as_written",
-    "assembled",
-    "load",
-    "read_axes",
-    "read_scene",
-    "read_solver",
-    "sweepable",
-    "tell_unit",
-    "with_refine",
-    "with_values",
-]
+from ringsweep.config.scene import sweepable as sweepable
+from ringsweep.config.solver import read_solver as read_solver
 
 # These files may use everything that is imported above.
 load_own_files(OWN_FILES)
