@@ -57,9 +57,10 @@ def test_release_is_refused_until_one_command_has_filled_the_address_of_the_proj
 @pytest.mark.parametrize("file", sorted((ROOT / "tests/data").glob("*.nc")), ids=lambda file: file.name)
 def test_kept_file_of_an_earlier_version_is_read(file, tmp_path, capsys):
     """Nine cells of a ring under stiction; the file has no seal, since it is older."""
-    assert cli.main(["verify", str(file)]) == 0
     assert cli.main(["info", str(file)]) == 0
     assert "separating: 5 (55.6%)" in capsys.readouterr().out
+    assert cli.main(["verify", str(file)]) == 2
+    assert "no seal: another program or an older version wrote it" in capsys.readouterr().err
     assert cli.main(["map", str(file), "-o", str(tmp_path / "map.png")]) == 0
     config = load(file)
     assert config.axes.sizes == {"drive_amplitude": 3, "zone_half_angle": 3}

@@ -342,7 +342,7 @@ class TestCheckpoint:
         assert cli.main(command) == 2
         out, message = capsys.readouterr()
         assert "already" not in out
-        assert "not as ringsweep wrote them are phi_end" in message
+        assert "out.nc: no seal: another program or an older version wrote it" in message
         assert message.endswith("--fresh (in Python fresh=True) computes it again\n")
         assert cli.main([*command, "--fresh"]) == 0
         assert netcdf.check(target)
@@ -424,7 +424,14 @@ class TestFullDisk:
 
     def test_file_that_does_not_read_back_is_removed(self, config, tmp_path, monkeypatch, capsys):
         target = tmp_path / "out.nc"
-        monkeypatch.setattr(netcdf, "altered", lambda *_, **__: ["regime"])
+        write = netcdf._write_chunks
+
+        def faulty(file, *others):
+            digests = write(file, *others)
+            file["phi_max"][:] = 0.0
+            return digests
+
+        monkeypatch.setattr(netcdf, "_write_chunks", faulty)
         assert cli.main(["run", str(config), "-o", str(target)]) == 1
         assert "does not read back" in capsys.readouterr().err
         assert left(target) == ["out.nc.partial"]

@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmarks.hostile.attack import Ended, Report, command, configuration, contents, end, here, start
 
 #: What a command may say of a damaged file.
-_TOLD = re.compile(r"damaged|no digest|was not written by ringsweep")
+_TOLD = re.compile(r"damaged|no seal|was not written by ringsweep")
 
 
 def _flip(content: bytearray, draw: random.Random, bits: int) -> None:
@@ -74,7 +74,7 @@ def damaged_files(folder: Path, count: int, seed: int) -> Report:
             ends["reuse"] = command("run", configs[name], "--reuse", victim, "-o", new)
         same = {
             "verify": lambda name=name: equal(victim, name),
-            "info": lambda name=name, told=ends["info"]: _but_digest(told.text) == _but_digest(told_of_whole[name]),
+            "info": lambda name=name, told=ends["info"]: _but_seal(told.text) == _but_seal(told_of_whole[name]),
             "reuse": lambda name=name: equal(new, name),
             "plot": lambda: picture.read_bytes() == drawn,
         }
@@ -102,9 +102,9 @@ def _silence(ended: Ended, same: object) -> str:
     """Why the end of a command hides damage; empty if it does not."""
     if ended.status == 0:
         assert callable(same)
-        return "" if same() else "other numbers in silence"
+        return "" if "no seal" in ended.text or same() else "other numbers in silence"
     return "" if _TOLD.search(ended.text) else f"the cause is not told: {ended.last}"
 
 
-def _but_digest(text: str) -> list[str]:
-    return [line for line in text.splitlines() if not line.startswith("digest:")]
+def _but_seal(text: str) -> list[str]:
+    return [line for line in text.splitlines() if not line.startswith("seal:")]

@@ -49,7 +49,6 @@ def _after(owner: Any, name: str, die: Callable[[], None]) -> None:
 
 def _points() -> dict[str, Callable[[Callable[[], None]], None]]:
     """Points at which a run can be killed, by name; each value installs the kill."""
-    from ringsweep.quantities import digest
     from ringsweep.storage import netcdf
     from ringsweep.storage.checkpoint import Checkpoint
 
@@ -57,8 +56,8 @@ def _points() -> dict[str, Callable[[Callable[[], None]], None]]:
         "flush": lambda die: _before(os, "fsync", die),
         "before a rename": lambda die: _before(Path, "replace", die),
         "after a rename": lambda die: _after(Path, "replace", die),
-        "merge": lambda die: _before(digest, "add", die),
-        "read back": lambda die: _before(netcdf, "_read_back", die),
+        "merge": lambda die: _before(netcdf, "_add_values", die),
+        "read back": lambda die: _before(netcdf, "_seal", die),
         "clean-up": lambda die: _before(Checkpoint, "clear", die),
     }
 

@@ -235,10 +235,10 @@ def info_command(arguments: argparse.Namespace) -> None:
     """Print a summary of a result file."""
     from ringsweep.storage import netcdf
 
-    has_digest = netcdf.check(arguments.dataset)
+    sealed = netcdf.check(arguments.dataset)
     with netcdf.reading(arguments.dataset) as result:
         _print_summary(arguments.dataset, result)
-    print("digest:", "the file is what ringsweep wrote" if has_digest else "none, so damage would not be noticed")
+    print("seal:", "the file is what ringsweep wrote" if sealed else "none, so damage would not be noticed")
 
 
 def verify_command(arguments: argparse.Namespace) -> int:

@@ -211,7 +211,7 @@ def build_parser() -> argparse.ArgumentParser:
     info.add_argument("dataset", metavar="OUT.nc")
 
     verify = _add_command(commands, "verify", verify_command, "check that files are what ringsweep wrote", """
-        ringsweep verify my.nc             exit status 0, or 2 if it is damaged, was changed, or has no digest
+        ringsweep verify my.nc             exit status 0, or 2 if it is damaged, was changed, or has no seal
         ringsweep verify results/*.nc
         """)  # fmt: skip
     verify.add_argument("files", nargs="+", metavar="FILE.nc")

@@ -35,7 +35,6 @@ from ringsweep.config.solver import read_solver
 from ringsweep.config.yaml_text import Document, scalar
 from ringsweep.errors import InputError
 from ringsweep.models.scene import LAW, Scene
-from ringsweep.quantities.digest import ALTERED
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, other_unit, show
 from ringsweep.quantities.variables import written
@@ -119,7 +118,9 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[
                 raise InputError(path, "is swept here: --set changes values that all cells share")
         found = _validate(doc)
         if doc.result_axes is not None and doc.result_axes.keys() != found.axes.columns.keys():
-            raise InputError("", f"{ALTERED}: its coordinates are not the axes of its configuration")
+            raise InputError(
+                "", "is damaged, or a part of a result: its coordinates are not the axes that it was run with"
+            )
     _tell_units(changed, found.scene)
     if doc.result_axes is None:
         return found

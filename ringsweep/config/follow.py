@@ -17,7 +17,6 @@ from ringsweep.models.model import Continues
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.friction import TRAITS
 from ringsweep.quantities import trailer
-from ringsweep.quantities.digest import ALTERED, Digests
 from ringsweep.quantities.flags import FAILED, JAMMED, REGIMES, SEPARATING
 from ringsweep.quantities.units import show
 
@@ -203,14 +202,8 @@ def _end_of(file: str, model: Continues) -> dict[str, NDArray[np.float64]]:
     """
     where = "scene.initial.from"
     try:
-        trailer.check(file, whole=True)
-        with trailer.opened(file) as content:
-            recorded = Digests.read(content)
+        with trailer.opened(file, whole=True) as content:
             names = [name for name in ("t_end", *model.ends, "deflection_end") if name in content.variables]
-            if recorded is not None:
-                changed = recorded.altered(content, ["configuration"], ["regime", *names])
-                if changed:
-                    raise InputError(where, f"{ALTERED}: not as ringsweep wrote them are {', '.join(changed)}")
             flags = np.ravel(content["regime"][:])
             meanings = dict(zip(content["regime"].flag_values, content["regime"].flag_meanings.split(), strict=True))
             found = {name: np.ma.filled(content[name][:], np.nan).astype(float).ravel() for name in names}

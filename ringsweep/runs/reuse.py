@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 from collections.abc import Collection, Iterator, Mapping
 from copy import deepcopy
@@ -23,8 +22,6 @@ from ringsweep.quantities.variables import INFERRED, OUTCOMES
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import differences, fingerprint, identity
-
-logger = logging.getLogger("ringsweep")
 
 # Two spacings of one axis differ by rounding, at most by this relative difference.
 _ROUNDING = 8 * np.finfo(float).eps
@@ -53,8 +50,7 @@ class EarlierSweep:
 
     def __init__(self, path: str | os.PathLike[str], config: Config):
         self.path = path
-        if not netcdf.check(path):
-            logger.warning("%s has no digest: damage to its cells would not be noticed", path)
+        netcdf.check(path)
         with netcdf.reading(path) as ds:
             if "regime" not in ds or "time" in ds.dims:
                 raise InputError(str(path), "holds no sweep whose cells could be reused")

@@ -391,7 +391,7 @@ def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
         stored_fingerprint = ds.attrs.get("fingerprint")
     if stored_fingerprint == checkpoint.fingerprint:
         try:
-            netcdf.check(target)
+            netcdf.verify(target)
         except InputError as error:
             cure = "--fresh (in Python fresh=True) computes it again"
             raise InputError(str(target), f"{error.problem}; {cure}") from error

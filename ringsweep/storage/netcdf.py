@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
 import stat
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import MappingProxyType
@@ -19,8 +20,7 @@ from numpy.typing import NDArray
 from xarray.backends import NetCDF4DataStore
 
 from ringsweep.errors import InputError
-from ringsweep.quantities import digest, trailer
-from ringsweep.quantities.digest import Digests
+from ringsweep.quantities import trailer
 from ringsweep.quantities.variables import MISSING, OUTCOMES, Variable, error_attribute, meanings_of
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.files import WorkingFolder, check_name, put_in_place, replacing
@@ -30,9 +30,6 @@ SIGNATURE = ("Conventions", "ringsweep_version")
 
 #: Variables with fewer elements are not compressed: the index of their chunks would take more than compression saves.
 COMPRESSED_FROM = 1024
-
-# Number of differing names that a message lists.
-_MAX_NAMED = 4
 
 # Bytes of each variable of an open file that are kept: a few chunks.
 _CACHE = 1 << 20
@@ -59,9 +56,7 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     with replacing(path) as temporary, _naming_the_cause(Path(path)):
         with _created(temporary) as file:
             _add(ds, file)
-            _record_digests(file, ds)
-        _read_back(temporary)
-        trailer.seal(temporary)
+        _seal(temporary, ds)
 
 
 def write(
@@ -102,9 +97,8 @@ def write(
         with _naming_the_cause(target):
             with _created(temporary) as file:
                 _add(frame, file)
-                _write_chunks(file, frame, variables, layout, chunks, gaps)
-            _read_back(temporary)
-            trailer.seal(temporary)
+                written = _write_chunks(file, frame, variables, layout, chunks, gaps)
+            _seal(temporary, frame, written, layout)
             put_in_place(temporary, target)
     finally:
         with suppress(OSError):
@@ -133,13 +127,48 @@ def _created(path: Path) -> Iterator[Any]:
         raise
 
 
-def _read_back(path: Path) -> None:
-    try:
-        changed = altered(path, whole=True, trusted=True)
-    except InputError as error:
-        raise OSError("the file cannot be read back") from error
-    if changed:
+def _seal(
+    path: Path, frame: xr.Dataset, written: Mapping[str, Any] = MappingProxyType({}), layout: Layout | None = None
+) -> None:
+    """Seal a complete file, if it reads back as it was written.
+
+    Parameters
+    ----------
+    path : Path
+    frame : xarray.Dataset
+        What was written whole.
+    written : mapping
+        Digests of the columns that were written chunk by chunk.
+    layout : Layout, optional
+        Their chunks.
+    """
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        for name, data in frame.variables.items():
+            _compare(file[str(name)], _add_values(_new_digest(), data.values), [()])
+        for name, digest in written.items():
+            assert layout is not None
+            _cache_one_chunk(file[name])
+            _compare(file[name], digest, (region for _, _, region in layout.chunks()))
+    trailer.seal(path)
+
+
+def _compare(variable: Any, digest: Any, regions: Iterable[tuple[slice, ...]]) -> None:
+    again = _new_digest()
+    for region in regions:
+        _add_values(again, variable[(*region, ...)])
+    if again.digest() != digest.digest():
         raise OSError("the file does not read back as it was written")
+
+
+def _new_digest() -> Any:
+    return hashlib.blake2b(digest_size=16)
+
+
+def _add_values(digest: Any, values: NDArray[Any]) -> Any:
+    array = np.asarray(values)
+    digest.update(json.dumps(array.tolist()).encode() if array.dtype.kind in "OU" else np.ascontiguousarray(array).data)
+    return digest
 
 
 def _add(ds: xr.Dataset, file: Any) -> None:
@@ -159,8 +188,8 @@ def _write_chunks(
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
     gaps: Collection[str],
-) -> None:
-    """Add the columns and the digests to a file."""
+) -> dict[str, Any]:
+    """Add the columns to a file. Returns their digests."""
     dims = tuple(map(str, frame.sizes))[: len(layout.sizes)]
     others = " ".join(str(name) for name in frame.coords if name not in frame.dims)
     digests: dict[str, Any] = {}
@@ -178,66 +207,10 @@ def _write_chunks(
                 _cache_one_chunk(variable)
                 described = variables[name].attributes | error_attribute(name, columns)
                 variable.setncatts(described | ({"coordinates": others} if others else {}))
-                digests[name] = digest.of_variable(variable)
+                digests[name] = _new_digest()
             file[name][(*region, ...)] = column
-            digest.add(digests[name], column)
-    _record_digests(file, frame, digests, layout)
-
-
-def _record_digests(
-    file: Any, ds: xr.Dataset, digests: Mapping[str, Any] = MappingProxyType({}), layout: Layout | None = None
-) -> None:
-    """Write the digests of a dataset into its file, together with those of columns that were written chunk by chunk."""
-    own = {name: digest.of_variable(file[name], [ds[name].values]) for name in map(str, ds.variables)}
-    covered = [name for name in file.ncattrs() if name not in digest.FREE]
-    recorded = Digests(
-        dimensions={name: len(dimension) for name, dimension in file.dimensions.items()},
-        attributes={name: digest.of_attribute(file.getncattr(name)) for name in covered},
-        variables={name: one.hexdigest() for name, one in {**own, **digests}.items()},
-        block=None if layout is None else list(layout.chunk),
-    )
-    file.setncattr(digest.ATTRIBUTE, recorded.text)
-
-
-def altered(path: str | os.PathLike[str], *, whole: bool, trusted: bool = False) -> list[str] | None:
-    """Names of what is not as it was written in a file; None if the file has no digests.
-
-    Parameters
-    ----------
-    path : path-like
-    whole : bool
-        Whether to read all variables, or only those whose values have no checksums of their own.
-    trusted : bool
-        Whether the HDF5 library is given the file without a look at its seal.
-
-    Raises
-    ------
-    InputError
-        If the file is no NetCDF file, or is damaged.
-    """
-    if not trusted:
-        with _reading_file(path):
-            trailer.check(path, whole=whole)
-    with _reading_file(path), trailer.opened(path) as file:
-        recorded = Digests.read(file)
-        if recorded is None:
-            return None
-        checked = set()
-        for name, variable in file.variables.items():
-            _cache_one_chunk(variable)
-            filters: Any = variable.filters()
-            if not whole and filters and filters["fletcher32"]:
-                checked.add(name)
-        # Other programs may add names, but what a result is read by has a digest.
-        needed = [name for name, one in file.variables.items() if name in OUTCOMES or "path" in one.ncattrs()]
-        names = [name for name in dict.fromkeys((*recorded.variables, *needed)) if name not in checked]
-        attributes = dict.fromkeys((*recorded.attributes, *{"configuration", *SIGNATURE}.intersection(file.ncattrs())))
-        return recorded.altered(file, attributes, names, _blocks)
-
-
-def _blocks(shape: Sequence[int], block: list[int]) -> Iterator[tuple[Any, ...]]:
-    for _, _, region in Layout(shape[: len(block)], block).chunks():
-        yield (*region, ...)
+            _add_values(digests[name], column)
+    return digests
 
 
 @contextmanager
@@ -313,13 +286,11 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a file of this package. Values are read when they are needed.
 
-    Attributes, and values that have no checksum of their own, are compared with the digests in the file. The dataset
-    does not have these, because they do not hold for what is made of it. It is a context manager that closes the file.
-    Parameters and errors are those of :func:`load`.
+    The dataset is a context manager that closes the file. Parameters and errors are those of :func:`load`.
     """
     _check_exists(path)
-    if changed := altered(path, whole=False):
-        raise InputError(str(path), _difference(changed))
+    with _reading_file(path), trailer.opened(path):
+        pass
     with _reading_file(path), _small_caches():
         # Decoding would turn numbers of seconds into timedelta64.
         ds = xr.open_dataset(Path(path).resolve(), engine="netcdf4", decode_times=False)
@@ -335,7 +306,8 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     except InputError:
         ds.close()
         raise
-    ds.attrs.pop(digest.ATTRIBUTE, None)
+    # That of an earlier version does not hold for what is made of the dataset.
+    ds.attrs.pop("digest", None)
     return ds
 
 
@@ -353,19 +325,19 @@ def reading(path: str | os.PathLike[str]) -> Iterator[xr.Dataset]:
         except Exception as error:
             if "NetCDF: " in str(error):
                 raise InputError(str(path), _DAMAGED) from error
-            if isinstance(error, OSError) or altered(path, whole=True) == []:
+            if isinstance(error, OSError) or trailer.check(path, whole=True):
                 raise
             problem = f"is not what ringsweep writes ({type(error).__name__}: {error})"
             raise InputError(str(path), problem) from error
 
 
 def check(path: str | os.PathLike[str]) -> bool:
-    """Compare all that a file holds with its digests.
+    """Compare all bytes of a file with its seal.
 
     Returns
     -------
     bool
-        Whether it has digests. Files of versions before 0.1 have none.
+        Whether it has a seal. Files that another program or an older version wrote have none.
 
     Raises
     ------
@@ -373,18 +345,16 @@ def check(path: str | os.PathLike[str]) -> bool:
         If the file is not what was written, or as for :func:`load`.
     """
     _check_exists(path)
-    changed = altered(path, whole=True)
-    if changed:
-        raise InputError(str(path), _difference(changed))
+    with _reading_file(path):
+        sealed = trailer.check(path, whole=True)
     open_dataset(path).close()
-    return changed is not None
+    return sealed
 
 
 def verify(path: str | os.PathLike[str]) -> None:
-    """Check that a file holds what ringsweep wrote: every value, its unit and meaning, and every attribute.
+    """Check that a file is what ringsweep wrote, byte for byte.
 
-    The digests that a file holds cover neither compression and chunks, nor attributes and variables that other programs
-    add. They show damage and changes, but they are no signature: someone who wants to deceive can compute them too.
+    The seal of a file shows damage. It is no signature: someone who wants to deceive can compute it too.
 
     Parameters
     ----------
@@ -394,7 +364,7 @@ def verify(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        If the file is damaged, was changed, or has no digest because an older version wrote it.
+        If the file is damaged, or has no seal because another program or an older version wrote it.
 
     Examples
     --------
@@ -403,20 +373,10 @@ def verify(path: str | os.PathLike[str]) -> None:
     >>> ringsweep.verify("my-sweep.nc")
     """
     if not check(path):
-        raise InputError(
-            str(path), "no digest: xarray or an older version wrote it, or it was removed. Nothing is known"
-        )
+        raise InputError(str(path), "no seal: another program or an older version wrote it. Nothing is known")
 
 
 _DAMAGED = "is not a NetCDF file, or is damaged"
-
-
-def _difference(names: Sequence[str]) -> str:
-    listed = ", ".join(names[:_MAX_NAMED]) + f" and {len(names) - _MAX_NAMED} more" * (len(names) > _MAX_NAMED)
-    return (
-        f"{digest.ALTERED}: not as ringsweep wrote them are {listed} "
-        f'(a part or a change that is wanted: `del ds.attrs["{digest.ATTRIBUTE}"]` in xarray, and save ds)'
-    )
 
 
 def _check_exists(path: str | os.PathLike[str]) -> None:
