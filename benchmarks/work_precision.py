@@ -380,11 +380,6 @@ def at_target(measured: Mapping[str, xr.Dataset]) -> str:
     return markdown(["", *(SCENES[name].title for name in measured)], rows)
 
 
-#: Rows of the table in the documents: what somebody would try on the stiff scene, from the default on.
-CHOSEN = ("implicit, rtol 3e-06", "numbalsoda LSODA, rtol 1e-09", "SciPy LSODA, rtol 1e-08",
-          "rk4, 1e+04 steps", "rk4, 1e+06 steps", "rk4, 1e+07 steps")  # fmt: skip
-
-
 def number(value: float) -> str:
     """Two digits of a number, without an exponent."""
     return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
@@ -437,12 +432,7 @@ def main() -> None:
         data.to_netcdf(folder / "work_precision.nc", group=name, mode="a" if k else "w")
     draw_all(measured, folder)
     if not given.scene:
-        header, *rows = rows_of(measured["stiff"])
-        figures = {
-            "stiff": markdown(header, [row for row in rows if row[0] in CHOSEN]),
-            "equal": at_target(measured),
-            "cells": str(effort.cells),
-        }
+        figures = {"equal": at_target(measured)}
         publish(given, "work_precision", "Error against run time", where, report, figures)
 
 
