@@ -15,7 +15,7 @@ from ringsweep import plots
 from ringsweep.plots.datasets import FLIGHT, PIVOT, phases
 from ringsweep.plots.films import _Film
 from ringsweep.plots.rig import ring_history
-from ringsweep.plots.style import AFTERMATH_COLOURS
+from ringsweep.plots.look import AFTERMATH_COLOURS
 from ringsweep.quantities.flags import AFTERMATHS, OPEN, SEPARATING, TUMBLED
 from ringsweep.quantities.variables import HISTORY, IMPACTS, OUTCOMES
 

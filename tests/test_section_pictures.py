@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from ringsweep import InputError, cli, plots
-from ringsweep.plots.style import PAIR_COLOURS
+from ringsweep.plots.look import PAIR_COLOURS
 
 mpl.use("Agg")
 

@@ -8,13 +8,15 @@ notebooks too, unless ``style`` chooses another look.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+from ringsweep.plots.films import animation, save_animation
 from ringsweep.plots.fits import fit
 from ringsweep.plots.histories import history, history_panel
+from ringsweep.plots.look import REGIME_COLOURS, style
+from ringsweep.plots.loops import friction_loop
 from ringsweep.plots.maps import map_panel, regime_map
 from ringsweep.plots.page import save_page
+from ringsweep.plots.phase import phase_portrait
+from ringsweep.plots.polar import polar_view
 from ringsweep.plots.precision import precision_panel, work_precision
 from ringsweep.plots.probability import probability_panel, sensitivity_panel, survival_panel
 from ringsweep.plots.saving import SUFFIXES, save
@@ -27,13 +29,6 @@ from ringsweep.plots.sections import (
     section_panel,
 )
 from ringsweep.plots.selection import cell
-from ringsweep.plots.style import REGIME_COLOURS, style
-
-if TYPE_CHECKING:
-    from ringsweep.plots.films import animation, save_animation
-    from ringsweep.plots.loops import friction_loop
-    from ringsweep.plots.phase import phase_portrait
-    from ringsweep.plots.polar import polar_view
 
 __all__ = [
     "REGIME_COLOURS",
@@ -64,22 +59,3 @@ __all__ = [
     "survival_panel",
     "work_precision",
 ]
-
-# Modules that need the models, which are slow to import: a map does not wait for them.
-_SLOW = {
-    "animation": "films",
-    "friction_loop": "loops",
-    "phase_portrait": "phase",
-    "polar_view": "polar",
-    "save_animation": "films",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _SLOW:
-        return getattr(import_module(f"ringsweep.plots.{_SLOW[name]}"), name)
-    raise AttributeError(f"module 'ringsweep.plots' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *_SLOW]

@@ -13,34 +13,29 @@ import numpy as np
 import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, HTMLWriter, PillowWriter
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from PIL import Image
 
 from ringsweep.errors import InputError
+from ringsweep.plots import datasets, look
 from ringsweep.plots.belt import BeltArtists
-from ringsweep.plots.datasets import on_ring, outcome, panels_of, require_history
 from ringsweep.plots.histories import draw_panel, time_limits
 from ringsweep.plots.labels import axis_label
 from ringsweep.plots.polar import RingArtists, states_at
 from ringsweep.plots.rig import belt_history, ring_history
 from ringsweep.plots.saving import suffix_of
-from ringsweep.plots.style import LEGEND, SMALL, folded, on_page, page_colour
-from ringsweep.runs.executors import progress_bar
 from ringsweep.storage.files import check_writable, replacing
 
 # By suffix what writes a film. A page holds all of its frames, without limit.
-_WRITERS: dict[str, Any] = {
-    ".mp4": partial(FFMpegWriter, codec="h264"),
-    ".gif": PillowWriter,
-    ".html": partial(HTMLWriter, embed_frames=True, embed_limit=np.inf),
-}
+_WRITERS: dict[str, Any] = {".mp4": partial(FFMpegWriter, codec="h264"), ".gif": PillowWriter}
+_WRITERS[".html"] = partial(HTMLWriter, embed_frames=True, embed_limit=np.inf)
 
-# Signs on the buttons of a page, in place of icons that it would load from the internet.
-_SIGNS = {"minus": "\N{MINUS SIGN}", "plus": "+", "play": "▶", "play fa-flip-horizontal": "◀", "pause": "⏸"}
-_SIGNS |= {"fast-backward": "⏮", "step-backward": "◁", "step-forward": "▷", "fast-forward": "⏭"}
+# What a page would load from the internet: a style sheet and icons; signs on the buttons take their place.
+_ICONS = re.compile('<link[^>]*>|<i class="fa fa-([^"]*)"></i>')
+_SIGNS = {None: '<meta charset="utf-8">', "minus": "\N{MINUS SIGN}", "plus": "+", "pause": "⏸", "play": "▶"}
+_SIGNS |= {"play fa-flip-horizontal": "◀", "fast-backward": "⏮", "step-backward": "◁"}
+_SIGNS |= {"step-forward": "▷", "fast-forward": "⏭"}
 
 # Inches, dots per inch, and colours of a frame of a page. Codecs of mp4 need even numbers of pixels.
 _SIZE, _DPI, _COLOURS = (10.8, 5.4), 100, 128
@@ -123,6 +118,8 @@ def save_animation(
     Traceback (most recent call last):
     ringsweep.errors.InputError: run.mp3: animations end in .mp4, .gif, .html, not in '.mp3'
     """
+    from ringsweep.runs.executors import progress_bar
+
     check_animation(path)
     film, suffix = animation(ds, fps=fps, duration=duration), Path(path).suffix.lower()
     bar = progress_bar(max(2, round(fps * duration)), progress, unit="frame")
@@ -130,10 +127,8 @@ def save_animation(
         made = Path(folder, f"film{suffix}")
         film.save(made, writer=_WRITERS[suffix](fps=fps), dpi=_DPI, progress_callback=lambda *_: bar.update())
         if suffix == ".html":
-            page = re.sub("<link[^>]*>", '<meta charset="utf-8">', made.read_text(encoding="utf-8"))
-            made.write_text(
-                re.sub('<i class="fa fa-([^"]*)"></i>', lambda icon: _SIGNS[icon[1]], page), encoding="utf-8"
-            )
+            page = re.sub(_ICONS, lambda icon: _SIGNS[icon[1]], made.read_text(encoding="utf-8"))
+            made.write_text(page, encoding="utf-8")
         temporary.write_bytes(made.read_bytes())
 
 
@@ -160,47 +155,50 @@ class _Film(Figure):
         super().__init__(figsize=_SIZE, dpi=_DPI, layout="constrained")
         subfigures: Any = self.subfigures(1, 2, width_ratios=[1.0, 1.15])
         left, right = subfigures
-        self.body: RingArtists | BeltArtists
-        if on_ring(require_history(ds)):
+        if datasets.on_ring(datasets.require_history(ds)):
             run, rig = ring_history(ds)
-            self.body = RingArtists(left.add_subplot(), run, rig)
+            self.body: RingArtists | BeltArtists = RingArtists(left.add_subplot(), run, rig)
         else:
             run = belt_history(ds)
-            above, below = left.subplots(2, 1, height_ratios=[1.0, 1.6])
-            self.body = BeltArtists(above, below, run)
+            self.body = BeltArtists(left.subplots(2, 1, height_ratios=[1.0, 1.6]), run)
         first, last = run["time"].values[[0, -1]]
         self.states = states_at(run, np.linspace(first, last, max(2, round(fps * duration))))
-        entries = self.body.legend_entries()
-        left.legend(handles=entries, loc="outside lower center", ncols=3, columnspacing=1, **LEGEND)
+        left.legend(handles=self.body.entries, loc="outside lower center", ncols=3, columnspacing=1, **look.LEGEND)
         left.suptitle(_speed(float(last - first), duration), fontsize="medium")
-        shown = [names for names in panels_of(run) if names not in (("epsilon",), ("impact_speed",))]
+        shown = [names for names in datasets.panels_of(run) if names not in (("epsilon",), ("impact_speed",))]
         panels = right.subplots(len(shown), 1, sharex=True)
         for panel, names in zip(panels, shown, strict=True):
             draw_panel(panel, run, names)
             if len(shown) > 3:
-                panel.yaxis.label.set_fontsize(SMALL)
+                panel.yaxis.label.set_fontsize(look.SMALL)
         panels[-1].set_xlabel(axis_label(run["time"], run))
         if last > first:
             panels[0].set_xlim(*time_limits(run))
         right.align_ylabels(panels)
-        right.suptitle(folded([outcome(run)], _SIZE[0] * 1.15 / 2.15), fontsize="medium")
+        right.suptitle(look.folded([datasets.outcome(run)], _SIZE[0] * 1.15 / 2.15), fontsize="medium")
         self.until = time_limits(run)[1]
-        self.futures = [_cover_of_future(panel) for panel in panels]
-        self.pixels = RendererAgg(*self.bbox.size, _DPI)
-        self.background: Any = None
+        # Translucent, above the marks of a history.
+        cover: dict[str, Any] = {"facecolor": look.page_colour(), "edgecolor": look.on_page("0.2"), "alpha": 0.8}
+        self.futures = [panel.axvspan(first, self.until, linewidth=1.0, zorder=6, **cover) for panel in panels]
+        self.moving = sorted([*self.body.moving, *self.futures], key=Artist.get_zorder)
         self.show_frame(0)
         # Texts change from frame to frame: a layout that followed them would shake.
         self.draw_without_rendering()
         self.set_layout_engine("none")
+        for artist in self.moving:
+            artist.set_animated(True)
+        self.pixels = RendererAgg(*self.bbox.size, _DPI)
+        self.draw(self.pixels)
+        self.background = self.pixels.copy_from_bbox(self.bbox)
 
     def show_frame(self, k: int) -> list[Artist]:
         """Move all moving artists to the `k`-th frame."""
         self.body.show(self.states, k)
-        now = float(self.states["time"][k])
+        now, is_last = float(self.states["time"][k]), k + 1 == len(self.states["time"])
         for cover in self.futures:
             # At the end nothing of the future is left to cover.
-            cover.set(x=now, width=self.until - now if k + 1 < len(self.states["time"]) else 0.0)
-        return [*self.body.moving, *self.futures]
+            cover.set(x=now, width=0.0 if is_last else self.until - now)
+        return self.moving
 
     def savefig(self, fname: Any, *, transparent: bool | None = None, **options: Any) -> None:
         """Write a picture; a frame of a film several times as fast, with few colours, since pages hold every frame."""
@@ -208,32 +206,14 @@ class _Film(Figure):
         if kind not in ("png", "rgba") or options.get("dpi") != _DPI:
             super().savefig(fname, transparent=transparent, **options)
             return
-        moving = sorted([*self.body.moving, *self.futures], key=Artist.get_zorder)
-        if self.background is None:
-            visible = [artist for artist in moving if artist.get_visible()]
-            for artist in visible:
-                artist.set_visible(False)
-            self.draw(self.pixels)
-            self.background = self.pixels.copy_from_bbox(self.bbox)
-            for artist in visible:
-                artist.set_visible(True)
         self.pixels.restore_region(self.background)
-        for artist in moving:
+        for artist in self.moving:
             artist.draw(self.pixels)
         frame = Image.fromarray(np.asarray(self.pixels.buffer_rgba())).convert("RGB")
         if kind == "png":
             frame.quantize(_COLOURS, dither=Image.Dither.NONE).save(fname, "png")
         else:
             fname.write(frame.convert("RGBA").tobytes())
-
-
-def _cover_of_future(panel: Axes) -> Rectangle:
-    """Translucent cover of the part of a history that comes after the frame."""
-    cover = Rectangle((0.0, 0.0), 0.0, 1.0, transform=panel.get_xaxis_transform(), facecolor=page_colour(), alpha=0.8)
-    # Above the marks of a history.
-    cover.set(zorder=6, edgecolor=on_page("0.2"), linewidth=1.0)
-    panel.add_patch(cover)
-    return cover
 
 
 def _speed(span: float, duration: float) -> str:

@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
-from ringsweep.plots.style import PAIR_COLOURS, SMALL, figure_width, legend_above, on_page, small_ticks
+from ringsweep.plots.look import PAIR_COLOURS, SMALL, figure_width, legend_above, on_page, small_ticks
 from ringsweep.quantities.quantity import after_number
 
 # Least height of the picture, inches.

@@ -16,48 +16,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ringsweep.plots.datasets import (
-    FLIGHT,
-    PANELS,
-    PIVOT,
-    compares_laws,
-    mode_name,
-    on_ring,
-    outcome,
-    panels_of,
-    phases,
-    present,
-    require_history,
-    resolve,
-    scene_text,
-    zones,
-)
+from ringsweep.plots import datasets, look
 from ringsweep.plots.labels import axis_label, displayed, label_axis, long_name, number_text, unit_text
-from ringsweep.plots.style import (
-    CURVE_COLOURS,
-    CURVE_STYLES,
-    LEGEND,
-    MARGIN,
-    OPEN,
-    PAIR_COLOURS,
-    PAIR_STYLES,
-    REST,
-    SMALL,
-    STICK,
-    arc_colour,
-    arc_names,
-    axes_or_current,
-    figure_width,
-    folded,
-    legend_above,
-    letters,
-    on_page,
-    page_colour,
-    place_legend,
-    small_ticks,
-    true_ranges,
-    width_of,
-)
 from ringsweep.quantities.flags import JAMMED, SEPARATING
 from ringsweep.quantities.variables import words
 
@@ -135,8 +95,8 @@ def history(ds: xr.Dataset) -> Figure:
     >>> len(history(ds).axes)
     4
     """
-    ds = require_history(ds)
-    width = figure_width()
+    ds = datasets.require_history(ds)
+    width = look.figure_width()
     # Panels must be as high as their labels.
     height = min(max(0.2 * width, 13.5 * rcParams["font.size"] / 100.0), 1.9)
     figure = Figure(figsize=(width, height * sum(_heights(ds)) + 0.8), layout="constrained")
@@ -179,15 +139,15 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
     >>> history_panel(ds, "phi", Figure().add_subplot()).get_xlabel()
     'time (s)'
     """
-    ds = require_history(ds)
-    var = resolve("var", var, [name for name, data in ds.items() if {"time", "impact"} & set(data.dims)])
-    ax = axes_or_current(ax, 0.34)
-    if compares_laws(ds):
+    ds = datasets.require_history(ds)
+    var = datasets.resolve("var", var, [name for name, data in ds.items() if {"time", "impact"} & set(data.dims)])
+    ax = look.axes_or_current(ax, 0.34)
+    if datasets.compares_laws(ds):
         _draw_laws(ax, ds, (var,))
         ax.set_xlabel(axis_label(ds["time"], ds))
-        place_legend(ax, list(ax.get_legend_handles_labels()[0]), handlelength=4)
+        look.place_legend(ax, list(ax.get_legend_handles_labels()[0]), handlelength=4)
     else:
-        names = next((panel for panel in chain(*PANELS.values()) if var in panel), (var,))
+        names = next((panel for panel in chain(*datasets.PANELS.values()) if var in panel), (var,))
         draw_panel(ax, ds, names, explain_shading=True)
     ax.set_xlabel(axis_label(ds["time"], ds))
     return ax
@@ -195,8 +155,8 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
 
 def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
     """Fill a figure, or a subfigure, with the panels of :func:`history`."""
-    ds = require_history(ds)
-    panels = panels_of(ds)
+    ds = datasets.require_history(ds)
+    panels = datasets.panels_of(ds)
     time = ds["time"].values
     heights = _heights(ds)
     start, breakaway = _differences(ds), _first_breakaway(ds)
@@ -213,7 +173,7 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
             ax.sharex(column[0])
         for ax in column[:-1]:
             ax.tick_params(labelbottom=False)
-    draw = _draw_laws if compares_laws(ds) else draw_panel
+    draw = _draw_laws if datasets.compares_laws(ds) else draw_panel
     for k, (ax, names) in enumerate(zip(axes, panels, strict=False)):
         if many:
             draw_panel(ax, ds, names, band=cycles)
@@ -224,7 +184,7 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
             beside[k].set_title("", loc="right")
         else:
             draw(ax, ds, names)
-    if strip := zones(ds):
+    if strip := datasets.zones(ds):
         _draw_zones(whole[-1], ds, strip)
         if many:
             _draw_zones(beside[-1], late, strip)
@@ -239,10 +199,10 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
             after.set_xlim(left=first / 20.0)
         # The force of one law alone would flatten the others: bristles may be far above them for a moment.
         after.set_ylim(whole[-1].get_ylim())
-        small_ticks(after)
+        look.small_ticks(after)
         texts = ["friction force just after the start", whole[-1].get_title(loc="right")]
         after.set_title("", loc="right")
-        after.set_title(folded(texts, 0.9 * width_of(after)), fontsize=SMALL, loc="left")
+        after.set_title(look.folded(texts, 0.9 * look.width_of(after)), fontsize=look.SMALL, loc="left")
         after.set_xlabel(axis_label(ds["time"], ds))
     if breakaway is not None:
         _draw_breakaway(axes[-1], ds, *breakaway)
@@ -250,28 +210,30 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
         whole[0].set_xlim(*time_limits(ds))
     whole[-1].set_xlabel(axis_label(ds["time"], ds))
     if many:
-        inches = width_of(whole[-1]) - MARGIN
+        inches = look.width_of(whole[-1]) - look.MARGIN
         label = axis_label(ds["time"], ds)
-        whole[-1].set_xlabel(folded([label, "band: least to greatest"], inches))
-        beside[-1].set_xlabel(folded([label, f"the last {_LAST_CYCLES} cycles"], inches))
+        whole[-1].set_xlabel(look.folded([label, "band: least to greatest"], inches))
+        beside[-1].set_xlabel(look.folded([label, f"the last {_LAST_CYCLES} cycles"], inches))
         beside[0].set_xlim(float(late["time"][0]), time_limits(ds)[1])
     figure.align_ylabels(axes)
-    if compares_laws(ds):
+    if datasets.compares_laws(ds):
         lines = axes[0].get_legend_handles_labels()
         most = 4 if len(lines[0]) == 4 else 3
         # A line of each entry, its label, and the space around them.
         longest = max(map(len, lines[1])) + 11
-        columns = max(1, min(most, letters(figure.bbox.width / float(figure.dpi)) // longest))
-        figure.legend(*lines, loc="outside upper center", ncols=columns, handlelength=4, **LEGEND)
-    elif text := "\n".join(filter(None, (outcome(ds), "; ".join(scene_text(ds))))):
+        columns = max(1, min(most, look.letters(figure.bbox.width / float(figure.dpi)) // longest))
+        figure.legend(*lines, loc="outside upper center", ncols=columns, handlelength=4, **look.LEGEND)
+    elif text := "\n".join(filter(None, (datasets.outcome(ds), "; ".join(datasets.scene_text(ds))))):
         inches = figure.bbox.width / float(figure.dpi)
-        figure.suptitle("\n".join(folded([line], inches) for line in text.splitlines()), fontsize="medium")
+        figure.suptitle("\n".join(look.folded([line], inches) for line in text.splitlines()), fontsize="medium")
 
 
 def _heights(ds: xr.Dataset) -> list[float]:
     """Relative heights of all panels, with those of the start and of the break-away, and the strip of the zones."""
-    strip, details = len(zones(ds)), (_differences(ds), _first_breakaway(ds))
-    return [1.0] * (len(panels_of(ds)) + sum(detail is not None for detail in details)) + [0.13 * strip] * bool(strip)
+    strip, details = len(datasets.zones(ds)), (_differences(ds), _first_breakaway(ds))
+    return [1.0] * (len(datasets.panels_of(ds)) + sum(detail is not None for detail in details)) + [
+        0.13 * strip
+    ] * bool(strip)
 
 
 def draw_panel(
@@ -286,27 +248,27 @@ def draw_panel(
     The legend explains the shading in the panel that shows where the body is, elsewhere if `explain_shading`. With the
     first samples of cycles as `band` the curves are bands from the least to the greatest value, without shading.
     """
-    small_ticks(axes)
-    time, names = ds["time"].values, tuple(present(ds, names))
-    explain_shading = explain_shading or names[0] in PANELS
+    look.small_ticks(axes)
+    time, names = ds["time"].values, tuple(datasets.present(ds, names))
+    explain_shading = explain_shading or names[0] in datasets.PANELS
     if "mode" in ds and band is None:
-        at, phase = _by_interval(time, phases(ds))
-        for value, look in _shades().items():
-            spans = [(at[i], at[j] - at[i]) for i, j in true_ranges(phase == value)]
-            label = mode_name(value) if explain_shading and spans else None
-            axes.broken_barh(spans, (0, 1), transform=axes.get_xaxis_transform(), linewidth=0, label=label, **look)
+        at, phase = _by_interval(time, datasets.phases(ds))
+        for value, shade in _shades().items():
+            spans = [(at[i], at[j] - at[i]) for i, j in look.true_ranges(phase == value)]
+            label = datasets.mode_name(value) if explain_shading and spans else None
+            axes.broken_barh(spans, (0, 1), transform=axes.get_xaxis_transform(), linewidth=0, label=label, **shade)
     if names == ("impact_speed",):
         _draw_impacts(axes, ds)
         return
-    for name, colour, style in zip(names, PAIR_COLOURS, PAIR_STYLES, strict=False):
+    for name, colour, style in zip(names, look.PAIR_COLOURS, look.PAIR_STYLES, strict=False):
         numbers = displayed(ds[name]).values
         if band is not None:
-            _draw_range(axes, time, numbers, band, color=on_page(colour), label=_LEGEND.get(name))
+            _draw_range(axes, time, numbers, band, color=look.on_page(colour), label=_LEGEND.get(name))
             continue
         curve = _envelope(time, numbers)
-        axes.plot(*curve, color=on_page(colour), linestyle=style, linewidth=1, label=_LEGEND.get(name))
+        axes.plot(*curve, color=look.on_page(colour), linestyle=style, linewidth=1, label=_LEGEND.get(name))
     _mark_separation(axes, ds, names)
-    legend_above(axes)
+    look.legend_above(axes)
     axes.set_ylabel(_short_label(ds, names[0]))
     if names[0].startswith("gap"):
         label_axis(axes.yaxis, _SHORT_NAMES[names[0]], unit_text(ds[names[0]]))
@@ -319,8 +281,8 @@ def draw_panel(
 
 def _cycles(ds: xr.Dataset) -> NDArray[np.intp]:
     """First sample of each cycle of one run: where its velocity rises through the middle of its range."""
-    name = next(iter(present(ds, ("omega", "velocity"))), None)
-    if name is None or compares_laws(ds):
+    name = next(iter(datasets.present(ds, ("omega", "velocity"))), None)
+    if name is None or datasets.compares_laws(ds):
         return np.empty(0, dtype=np.intp)
     numbers = ds[name].values
     low, high = np.nanquantile(numbers, (0.01, 0.99))
@@ -331,7 +293,9 @@ def _cycles(ds: xr.Dataset) -> NDArray[np.intp]:
     return apart[1:][above[1:] & ~above[:-1]]
 
 
-def _draw_range(axes: Axes, time: NDArray[Any], numbers: NDArray[Any], cycles: NDArray[np.intp], **look: Any) -> None:
+def _draw_range(
+    axes: Axes, time: NDArray[Any], numbers: NDArray[Any], cycles: NDArray[np.intp], **options: Any
+) -> None:
     """Draw the band from the least to the greatest value in every cycle, or in every few of very many."""
     starts = np.append(0, cycles[:: math.ceil(len(cycles) / _STEPS)])
     # The last cycle may be a part of one, whose band would be narrower.
@@ -339,15 +303,15 @@ def _draw_range(axes: Axes, time: NDArray[Any], numbers: NDArray[Any], cycles: N
     low, high = np.fmin.reduceat(numbers, starts), np.fmax.reduceat(numbers, starts)
     edges = np.append(time[starts], time[-1])
     style: dict[str, Any] = {"step": "post", "alpha": 0.45, "linewidth": 0.8}
-    axes.fill_between(edges, np.append(low, low[-1]), np.append(high, high[-1]), **style, **look)
+    axes.fill_between(edges, np.append(low, low[-1]), np.append(high, high[-1]), **style, **options)
 
 
 def _shades() -> dict[int, dict[str, Any]]:
     """Shading of times by phase."""
     return {
-        0: {"color": on_page(STICK)},
-        PIVOT: {"color": OPEN, "alpha": 0.18},
-        FLIGHT: {"color": OPEN, "alpha": 0.45},
+        0: {"color": look.on_page(look.STICK)},
+        datasets.PIVOT: {"color": look.OPEN, "alpha": 0.18},
+        datasets.FLIGHT: {"color": look.OPEN, "alpha": 0.45},
     }
 
 
@@ -356,12 +320,12 @@ def _draw_impacts(axes: Axes, ds: xr.Dataset) -> None:
     first, last = map(float, ds["time"].values[[0, -1]])
     time, contact, speed = (ds[name].values for name in ("impact_time", "impact_contact", "impact_speed"))
     shown = (first <= time) & (time <= last) & (speed > _WEAKEST * speed.max(initial=0.0))
-    colours = [*map(on_page, PAIR_COLOURS), on_page("black")]
+    colours = [*map(look.on_page, look.PAIR_COLOURS), look.on_page("black")]
     for which, colour, marker, label in zip((1, 2, 3), colours, "+x*", ("contact 1", "contact 2", "both"), strict=True):
         here = shown & (contact == which)
         if here.any():
             axes.plot(time[here], speed[here], marker=marker, color=colour, linestyle="", markersize=4, label=label)
-    legend_above(axes)
+    look.legend_above(axes)
     if shown.any():
         axes.set_yscale("log")
     axes.set_ylabel(_short_label(ds, "impact_speed"))
@@ -392,14 +356,14 @@ def _mark_separation(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None
         known = np.isfinite(ds[name].values) & (ds["time"].values <= instant * (1.0 + 1e-9))
         reaction = ds[name].values[known][-1]
         style: dict[str, Any] = {"marker": "o", "markersize": 5, "markerfacecolor": "none", "clip_on": False}
-        axes.plot([instant], [reaction], color=on_page("black"), linestyle="", zorder=5, label=text, **style)
+        axes.plot([instant], [reaction], color=look.on_page("black"), linestyle="", zorder=5, label=text, **style)
         text = "_"
 
 
 def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
     """Draw one quantity under each friction law."""
     (name,) = names
-    small_ticks(axes)
+    look.small_ticks(axes)
     numbers = displayed(ds[name]).transpose("friction_law", "time").values
     regimes = words(ds["regime"]).values if "regime" in ds else None
     for k, law in enumerate(ds["friction_law"].values):
@@ -408,7 +372,7 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
     axes.set_ylabel(_short_label(ds, name))
     axes.margins(x=0)
     if name.startswith(("normal", "gap")):
-        axes.set_title(f"contact {name[-1]}", fontsize=SMALL, loc="left")
+        axes.set_title(f"contact {name[-1]}", fontsize=look.SMALL, loc="left")
     if name in _CLIPPED:
         clip(axes, ds["time"].values, numbers)
 
@@ -416,8 +380,8 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
 def _law_style(k: int) -> dict[str, Any]:
     """Line of the `k`-th friction law."""
     return {
-        "color": on_page(CURVE_COLOURS[k % len(CURVE_COLOURS)]),
-        "linestyle": CURVE_STYLES[k % len(CURVE_STYLES)],
+        "color": look.on_page(look.CURVE_COLOURS[k % len(look.CURVE_COLOURS)]),
+        "linestyle": look.CURVE_STYLES[k % len(look.CURVE_STYLES)],
         # Where lines coincide, the earlier ones show on both sides of the later ones.
         "linewidth": max(1.2, 3.0 - 0.6 * k),
     }
@@ -429,7 +393,7 @@ def _differences(ds: xr.Dataset) -> tuple[float, float] | None:
     A difference between the forces ends at a time t if the forces agree from t to 2 t. There can be several: bristles
     bend within milliseconds, and the body vibrates on them for longer. None if there are none.
     """
-    if on_ring(ds) or not compares_laws(ds) or "friction_force" not in ds:
+    if datasets.on_ring(ds) or not datasets.compares_laws(ds) or "friction_force" not in ds:
         return None
     since = ds["time"].values - ds["time"].values[0]
     force = ds["friction_force"].transpose("friction_law", "time").values
@@ -447,9 +411,9 @@ def _first_breakaway(ds: xr.Dataset) -> tuple[NDArray[Any], float] | None:
 
     None if nothing breaks away, or if there is one law only and it has no bristles: its force falls at once.
     """
-    if on_ring(ds) or not {"first_slip", "friction_force", "velocity"} <= set(ds.variables):
+    if datasets.on_ring(ds) or not {"first_slip", "friction_force", "velocity"} <= set(ds.variables):
         return None
-    if not compares_laws(ds):
+    if not datasets.compares_laws(ds):
         if "deflection" not in ds or not ds["deflection"].any():
             return None
         ds = ds.expand_dims("friction_law")
@@ -470,15 +434,15 @@ def _draw_breakaway(axes: Axes, ds: xr.Dataset, first: NDArray[Any], window: flo
     """Draw the friction force around the first break-away under each law."""
     time = ds["time"].values
     force = np.atleast_2d(ds["friction_force"].transpose(..., "time").values)
-    small_ticks(axes)
-    one: dict[str, Any] = {"color": on_page(PAIR_COLOURS[0]), "linewidth": 1}
+    look.small_ticks(axes)
+    one: dict[str, Any] = {"color": look.pair(0), "linewidth": 1}
     for k, (numbers, start) in enumerate(zip(force, first, strict=True)):
         near = np.abs(time - start) <= window
-        axes.plot(time[near] - start, numbers[near], **_law_style(k) if compares_laws(ds) else one)
-    where = " under each law" if compares_laws(ds) else f", t = {number_text(first[0], '.5g')} s"
+        axes.plot(time[near] - start, numbers[near], **_law_style(k) if datasets.compares_laws(ds) else one)
+    where = " under each law" if datasets.compares_laws(ds) else f", t = {number_text(first[0], '.5g')} s"
     text = f"friction force around the first break-away{where}"
-    axes.set_title(folded([text], 0.9 * width_of(axes)), fontsize=SMALL, loc="left")
-    axes.locator_params(axis="x", nbins=max(4, int(1.4 * width_of(axes))))
+    axes.set_title(look.folded([text], 0.9 * look.width_of(axes)), fontsize=look.SMALL, loc="left")
+    axes.locator_params(axis="x", nbins=max(4, int(1.4 * look.width_of(axes))))
     axes.set_xlabel("time since the break-away (s)")
     axes.set_ylabel(_short_label(ds, "friction_force"))
     axes.margins(x=0)
@@ -489,17 +453,17 @@ def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
     at = _by_interval(ds["time"].values, ds[names[0]].values)[0]
     strip = np.array([_by_interval(ds["time"].values, ds[name].values)[1] for name in names])
     arcs = int(max(1, strip.max()))
-    colours = [on_page(REST), *(arc_colour(k + 1) for k in range(arcs))]
+    colours = [look.on_page(look.REST), *(look.arc_colour(k + 1) for k in range(arcs))]
     norm = BoundaryNorm(np.arange(arcs + 2) - 0.5, arcs + 1)
     axes.pcolormesh(at, np.arange(len(names) + 1), strip, cmap=ListedColormap(colours), norm=norm, rasterized=True)
-    axes.hlines(range(1, len(names)), at[0], at[-1], color=page_colour(), linewidth=2)
-    axes.set_yticks(np.arange(len(names)) + 0.5, labels=[f"contact {name[-1]}" for name in names], fontsize=SMALL)
+    axes.hlines(range(1, len(names)), at[0], at[-1], color=look.page_colour(), linewidth=2)
+    axes.set_yticks(np.arange(len(names)) + 0.5, labels=[f"contact {name[-1]}" for name in names], fontsize=look.SMALL)
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
-    surfaces = zip(colours, ["elsewhere", *arc_names(arcs)], strict=True)
+    surfaces = zip(colours, ["elsewhere", *look.arc_names(arcs)], strict=True)
     handles: list[Artist] = [Patch(facecolor=colour, edgecolor="0.7", label=name) for colour, name in surfaces]
-    legend_above(axes, handles)
-    axes.tick_params(axis="x", labelsize=SMALL)
+    look.legend_above(axes, handles)
+    axes.tick_params(axis="x", labelsize=look.SMALL)
 
 
 def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any], loc: Literal["left", "right"] = "right") -> None:
@@ -528,7 +492,7 @@ def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any], loc: Literal["le
         margin = 0.15 * (high - low)
         axes.set_ylim(low - margin, high + margin)
         ends = number_text(values[0]), number_text(values[-1])
-        axes.set_title(f"axis clipped; values from {ends[0]} to {ends[1]}", fontsize=SMALL, loc=loc)
+        axes.set_title(f"axis clipped; values from {ends[0]} to {ends[1]}", fontsize=look.SMALL, loc=loc)
 
 
 def _envelope(time: NDArray[Any], numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -11,8 +11,8 @@ import xarray as xr
 from matplotlib.axis import Axis
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.datasets import is_numeric, resolve
-from ringsweep.plots.style import angle_unit
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import NUMBER, quantity
 from ringsweep.quantities.variables import configuration_of, swept, written
@@ -125,7 +125,7 @@ def display_factor(data: xr.DataArray) -> float:
     """Factor from the numbers of a quantity to those in a picture, in the unit of :func:`in_units` or of the style."""
     if "display_factor" in data.attrs:
         return float(data.attrs["display_factor"])
-    return angle_unit()[0] if data.attrs.get("units") == "rad" else 1.0
+    return look.angle_unit()[0] if data.attrs.get("units") == "rad" else 1.0
 
 
 def displayed(data: xr.DataArray) -> xr.DataArray:
@@ -155,7 +155,7 @@ def unit_text(data: xr.DataArray) -> str:
     if "display_units" in data.attrs:
         units = {"deg": "°", "degree": "°"}.get(data.attrs["display_units"], data.attrs["display_units"])
     else:
-        units = angle_unit()[1] if units == "rad" else "" if units == "1" else units
+        units = look.angle_unit()[1] if units == "rad" else "" if units == "1" else units
     # Parameters have "m/s^2" where variables have "m s-2".
     units = re.sub(r"/([A-Za-z]+)\^?(\d*)", lambda unit: f" {unit[1]}-{unit[2] or 1}", units)
     return re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", r"$^{\1}$", units)

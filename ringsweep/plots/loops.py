@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.histories import clip
 from ringsweep.plots.labels import label_axis
 from ringsweep.plots.phase import draw_modes
 from ringsweep.plots.rig import belt_history
-from ringsweep.plots.style import SMALL, axes_or_current, place_legend, small_ticks
 
 # Share of the greatest velocity that the inset shows.
 _NEAR = 0.02
@@ -67,7 +67,7 @@ def friction_loop(
     if against not in ("velocity", "distance"):
         raise InputError("against", f"{against!r} is neither 'velocity' nor 'distance'")
     run = belt_history(ds)
-    ax = axes_or_current(ax, 0.63)
+    ax = look.axes_or_current(ax, 0.63)
     if against == "velocity":
         across = (run["velocity"] - run["belt_velocity"]).values
         label = "sliding velocity", "m s$^{-1}$"
@@ -82,7 +82,7 @@ def friction_loop(
     label_axis(ax.yaxis, "friction force", "N")
     if against == "velocity" and "deflection" in run and run["deflection"].values.any():
         _draw_near_zero(ax, run["mode"].values, across, force)
-    place_legend(ax, entries)
+    look.place_legend(ax, entries)
     return ax
 
 
@@ -96,6 +96,6 @@ def _draw_near_zero(ax: Axes, mode: NDArray[Any], velocity: NDArray[Any], force:
         if line.get_marker() != "None":
             line.set_visible(False)
     inset.set(xlim=(-width, width), ylim=ax.get_ylim(), yticks=[])
-    small_ticks(inset)
+    look.small_ticks(inset)
     label_axis(inset.xaxis, "near 0", "m s$^{-1}$")
-    inset.xaxis.label.set_fontsize(SMALL)
+    inset.xaxis.label.set_fontsize(look.SMALL)

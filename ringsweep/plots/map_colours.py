@@ -16,8 +16,8 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.labels import number_text
-from ringsweep.plots.style import AFTERMATH_COLOURS, CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
 from ringsweep.quantities.flags import FAILED, JAMMED
 from ringsweep.quantities.variables import INFERRED, SAMPLED, configuration_of, is_classification, meanings_of, written
 
@@ -56,7 +56,9 @@ class ColourScale:
             return cls(palette, Normalize(*limits))
         meanings = meanings_of(data)
         # The colour of a class does not depend on which other classes occur.
-        colours = [_WORDS.get(m, CLASS_COLOURS[k % len(CLASS_COLOURS)]) for k, m in enumerate(meanings.values())]
+        colours = [
+            _WORDS.get(m, look.CLASS_COLOURS[k % len(look.CLASS_COLOURS)]) for k, m in enumerate(meanings.values())
+        ]
         classes = BoundaryNorm(np.arange(len(meanings) + 1) - 0.5, len(meanings))
         names = tuple(meaning.replace("_", " ") for meaning in meanings.values())
         return cls(_with_grey(ListedColormap(colours)), classes, np.array(list(meanings)), names)
@@ -79,7 +81,7 @@ class ColourScale:
         return np.asarray(self.colours(self.norm(np.ma.masked_invalid(numbers))))
 
 
-_WORDS = REGIME_COLOURS | AFTERMATH_COLOURS
+_WORDS = look.REGIME_COLOURS | look.AFTERMATH_COLOURS
 
 #: Colour of zeros among numbers on a logarithmic scale: lighter than most numbers, and of another hue.
 ZERO = "#FBDFCB"
@@ -201,10 +203,10 @@ def legend_entries(
                 entries.append(Patch(color=scale.colours(k), label=f"{meaning}, {_share(where)}"))
     if not shown.all():
         other = ~shown & ~_inferred_apart(ds, data).values
-        entries.append(Patch(color=on_page(NO_VALUE), label=f"{missing_text(ds, data)}, {_share(other)}"))
+        entries.append(Patch(color=look.on_page(look.NO_VALUE), label=f"{missing_text(ds, data)}, {_share(other)}"))
     if isinstance(scale.norm, LogNorm) and (zero := data.values == 0.0).any():
         entries.append(Patch(color=ZERO, label=f"exactly 0, {_share(zero)}"))
-    ink = on_page("black")
+    ink = look.on_page("black")
     for warning in warnings:
         label = f"{warning.label}, {_share(warning.cells.values)}"
         if warning.everywhere:
@@ -219,7 +221,9 @@ def legend_entries(
 
 def _with_grey(colours: str | Colormap) -> Colormap:
     """A colour map with grey for missing values."""
-    return (colormaps[colours] if isinstance(colours, str) else colours).with_extremes(bad=to_rgb(on_page(NO_VALUE)))
+    return (colormaps[colours] if isinstance(colours, str) else colours).with_extremes(
+        bad=to_rgb(look.on_page(look.NO_VALUE))
+    )
 
 
 def _share(mask: NDArray[Any]) -> str:

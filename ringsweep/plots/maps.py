@@ -23,40 +23,10 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.plots import labels, look
 from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve, scene_text
-from ringsweep.plots.labels import (
-    amount_text,
-    axis_label,
-    display_factor,
-    displayed,
-    in_units,
-    long_name,
-    plain_text,
-    value_text,
-)
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import CellWarning, ColourScale, cell_warnings, legend_entries
-from ringsweep.plots.style import (
-    LEGEND,
-    MARGIN,
-    NO_VALUE,
-    PAIR_COLOURS,
-    SMALL,
-    axes_or_current,
-    columns_of,
-    figure_width,
-    folded,
-    height_of,
-    is_dark,
-    is_narrow,
-    label_axes,
-    legend_width,
-    on_page,
-    place_legend,
-    small_ticks,
-    true_ranges,
-    width_of,
-)
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import AUDITED, INFERRED, swept
 
@@ -153,12 +123,12 @@ def regime_map(
         if found.vertical is None:
             # Cells of a strip meet where the boundary is: halfway would leave slivers of the wrong colour beside it.
             places = boundaries[found.horizontal.name]
-            factor = display_factor(found.ds[found.horizontal.name])
+            factor = labels.display_factor(found.ds[found.horizontal.name])
             found = replace(found, horizontal=replace(found.horizontal, meet=places.values * factor))
-    width = figure_width()
+    width = look.figure_width()
     if len(found.panels) == 1:
         height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
-        figure = Figure(figsize=(width, height * width + (0.7 if is_narrow(width) else 0.3)), layout="constrained")
+        figure = Figure(figsize=(width, height * width + (0.7 if look.is_narrow(width) else 0.3)), layout="constrained")
         ax = figure.add_subplot()
         found.draw_alone(ax, title, legend)
         if boundaries is not None:
@@ -166,11 +136,11 @@ def regime_map(
         return figure
     panels = found.panels
     # Narrower panels have no room for ticks and titles.
-    columns = max(1, min(found.columns, int((width - MARGIN) / 1.2)))
+    columns = max(1, min(found.columns, int((width - look.MARGIN) / 1.2)))
     rows = math.ceil(len(panels) / columns)
     bar = found.scale.meanings is None and found.vertical is not None
-    each = (width - MARGIN * (2 if bar else 1)) / columns
-    titles = ["\n".join(folded([text], each) for text in texts) for texts, _ in panels]
+    each = (width - look.MARGIN * (2 if bar else 1)) / columns
+    titles = ["\n".join(look.folded([text], each) for text in texts) for texts, _ in panels]
     lines = max(title.count("\n") + 1 for title in titles)
     height = rows * (0.75 * each + 0.0175 * rcParams["font.size"] * lines) + 1.3
     figure = Figure(figsize=(width, height), layout="constrained")
@@ -181,7 +151,7 @@ def regime_map(
     for axes in grid.flat[len(panels) - columns : len(panels)]:
         axes.xaxis.set_tick_params(labelbottom=True)
     for axes, words, (_, index) in zip(grid.flat, titles, panels, strict=False):
-        axes.set_title(words, fontsize=SMALL)
+        axes.set_title(words, fontsize=look.SMALL)
         found.draw(axes, index)
     figure.supxlabel(found.horizontal.label, fontsize="medium")
     figure.supylabel(found.vertical_label, fontsize="medium")
@@ -190,8 +160,8 @@ def regime_map(
     text = found.title_text(title, width)
     if found.entries and legend is not False:
         # A legend above the panels would cover a title of the figure, and one below them the label of the axis.
-        style = LEGEND | {"handleheight": 1.4, "columnspacing": 1.2, "title": text, "title_fontsize": "medium"}
-        columns = columns_of(found.entries, width)
+        style = look.LEGEND | {"handleheight": 1.4, "columnspacing": 1.2, "title": text, "title_fontsize": "medium"}
+        columns = look.columns_of(found.entries, width)
         figure.legend(handles=found.entries, loc="outside upper center", ncols=columns, **style)
     elif text:
         figure.suptitle(text, fontsize="medium")
@@ -249,7 +219,7 @@ def map_panel(
     'phi_max (°)'
     """
     found = Map.of(ds, (x, y), var, sel)
-    ax = axes_or_current(ax, 0.65)
+    ax = look.axes_or_current(ax, 0.65)
     found.draw_alone(ax, title, legend)
     return ax
 
@@ -307,7 +277,7 @@ class Map:
         `axes` are `x` and `y`, `colours` are `norm` and `cmap`.
         """
         require_sweep(ds)
-        ds, sel = in_units(ds, units), sel or {}
+        ds, sel = labels.in_units(ds, units), sel or {}
         if is_sampled(ds):
             var = "probability" if var == "regime" else var
             # Regimes that occur nowhere have no map.
@@ -317,7 +287,7 @@ class Map:
                 )
         var = resolve("var", var, numeric_names(ds))
         ds, held, horizontal, vertical = choose_axes(ds, var, sel, *axes)
-        data = displayed(ds[var])
+        data = labels.displayed(ds[var])
         scattered = is_scattered(horizontal, vertical)
         scale = ColourScale.of(data, *colours)
         warnings = cell_warnings(ds, data)
@@ -330,13 +300,13 @@ class Map:
         share = math.prod(ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
         # The legend of a map of origins has the shares, and its title is long.
-        name, told, audit = "" if scale.meanings is None else long_name(data), scene_text(ds), audit_texts(ds)
+        name, told, audit = "" if scale.meanings is None else labels.long_name(data), scene_text(ds), audit_texts(ds)
         if var == "origin":
             name, told = "cells run or inferred", []
             audit = [text.replace("others: at most", "inferred: ≤") for text in audit[1:]]
         return cls(
             ds,
-            displayed(thin[var]),
+            labels.displayed(thin[var]),
             replace(Axis.of(thin[horizontal.name], thin), scale=horizontal.scale),
             replace(Axis.of(thin[vertical.name], thin), scale=vertical.scale) if vertical else None,
             scattered,
@@ -353,17 +323,17 @@ class Map:
         """Text beside the vertical axis."""
         if self.vertical:
             return self.vertical.label
-        return "" if self.scale.meanings else axis_label(self.data, self.ds)
+        return "" if self.scale.meanings else labels.axis_label(self.data, self.ds)
 
     def title_text(self, title: bool | str, inches: float) -> str:
         """The title in lines of at most this width; empty if the user wants none."""
         if isinstance(title, str):
             return title
-        return folded(self.texts, inches) if title else ""
+        return look.folded(self.texts, inches) if title else ""
 
     def draw(self, axes: Axes, index: Mapping[str, int]) -> None:
         """Draw the panel at an index along the dimensions that are not axes."""
-        small_ticks(axes)
+        look.small_ticks(axes)
         self.horizontal.apply(axes.set_xscale, axes.xaxis)
         if self.vertical:
             self.vertical.apply(axes.set_yscale, axes.yaxis)
@@ -392,7 +362,7 @@ class Map:
                 axes.plot(*points.T, marker="." if len(points) == 1 else "", **_CURVE)
 
     def _factor(self, axis: Axis) -> float:
-        return display_factor(self.ds[axis.name])
+        return labels.display_factor(self.ds[axis.name])
 
     def _whole_curve(self, vertical: Axis, line: xr.Dataset) -> NDArray[Any]:
         """Points of a curve, shape ``(points, 2)``: up to the frame if it ends at it, and closed if it is.
@@ -428,30 +398,33 @@ class Map:
         self.check_takes_curves()
         for held in swept(self.ds):
             if not held.dims and held.name in boundaries.coords and (boundaries[held.name].values != held.values).any():
-                raise InputError("boundaries", f"are those of another map: this one has {plain_text(value_text(held))}")
+                raise InputError(
+                    "boundaries", f"are those of another map: this one has {labels.plain_text(labels.value_text(held))}"
+                )
         regime, tolerance = boundaries.attrs["boundary_of"], boundaries.attrs["boundary_tolerance"]
         # Along each axis the error is a number in the unit of the axis.
         along = [self.ds[axis.name] for axis in (self.horizontal, self.vertical) if axis is not None]
         errors = dict.fromkeys(
-            plain_text(amount_text(axis.copy(data=np.full(axis.shape, tolerance))[0], 2)) for axis in along
+            labels.plain_text(labels.amount_text(axis.copy(data=np.full(axis.shape, tolerance))[0], 2))
+            for axis in along
         )
         return Line2D([], [], label=f"boundary of {regime}\n± {' or '.join(errors)}", **_CURVE)
 
     def _draw_line(self, axes: Axes, data: xr.DataArray) -> None:
         numbers, edges = data.values[self.horizontal.order], self.horizontal.edges
-        gaps = [(edges[i], edges[j] - edges[i]) for i, j in true_ranges(np.isnan(numbers))]
-        axes.broken_barh(gaps, (0, 1), transform=axes.get_xaxis_transform(), color=on_page(NO_VALUE), linewidth=0)
+        gaps = [(edges[i], edges[j] - edges[i]) for i, j in look.true_ranges(np.isnan(numbers))]
+        axes.broken_barh(
+            gaps, (0, 1), transform=axes.get_xaxis_transform(), color=look.on_page(look.NO_VALUE), linewidth=0
+        )
         marker = "o" if len(numbers) <= 100 else "."
-        axes.plot(self.horizontal.values, numbers, marker=marker, markersize=4, color=on_page(PAIR_COLOURS[0]))
+        axes.plot(self.horizontal.values, numbers, marker=marker, markersize=4, color=look.pair(0))
 
     def _draw_band(self, axes: Axes, index: Mapping[str, int]) -> None:
         """Draw the interval of a probability or a quantile, if the dataset has it."""
         ends = [f"{self.data.name}{end}" for end in ("_low", "_high")]
         if all(end in self.ds for end in ends):
-            low, high = (displayed(self.ds[end].isel(index)).values[self.horizontal.order] for end in ends)
-            axes.fill_between(
-                self.horizontal.values, low, high, color=on_page(PAIR_COLOURS[0]), alpha=0.25, linewidth=0
-            )
+            low, high = (labels.displayed(self.ds[end].isel(index)).values[self.horizontal.order] for end in ends)
+            look.band(axes, self.horizontal.values, low, high, look.pair(0))
 
     def _draw_levels(self, axes: Axes, vertical: Axis, data: xr.DataArray) -> None:
         """Draw the curves along which a probability is 5, 50 and 95 %."""
@@ -463,7 +436,7 @@ class Map:
             curves = axes.contour(x, y, numbers, levels, colors="white", linewidths=1.2, linestyles=styles)
             stroke: list[Any] = [withStroke(linewidth=2.2, foreground="#404040")]
             curves.set_path_effects(stroke)
-            for text in axes.clabel(curves, fmt=lambda level: f"{level:.0%}", fontsize=SMALL):
+            for text in axes.clabel(curves, fmt=lambda level: f"{level:.0%}", fontsize=look.SMALL):
                 text.set_path_effects(stroke)
 
     def _draw_points(self, axes: Axes, vertical: Axis, data: xr.DataArray, warnings: list[CellWarning]) -> None:
@@ -471,7 +444,7 @@ class Map:
         colours = self.scale.rgba(data.values.ravel())
         area = float(np.clip(6000 / x.size, 4, 60))
         axes.scatter(x, y, c=colours, s=area, rasterized=x.size > 5000)
-        dark = is_dark(colours)
+        dark = look.is_dark(colours)
         for warning in warnings:
             cells = warning.cells.transpose(*data.dims).values.ravel()
             for colour, where in (("white", cells & dark), ("black", cells & ~dark)):
@@ -486,7 +459,7 @@ class Map:
             axes.pcolormesh(x, y, colours, rasterized=True)
         else:
             axes.pcolormesh(x, y, np.ma.masked_invalid(numbers), cmap=scale.colours, norm=scale.norm, rasterized=True)
-        dark = is_dark(colours)
+        dark = look.is_dark(colours)
         for warning in warnings:
             cells = as_matrix(warning.cells, self.horizontal, self.vertical)
             for colour, where in (("white", cells & dark), ("black", cells & ~dark)):
@@ -523,25 +496,23 @@ class Map:
         if bar:
             self.add_colour_bar([axes])
         if legend is True:
-            legend = "below" if bar or is_narrow(width_of(axes)) else "beside"
-        beside = legend_width(self.entries) if legend == "beside" else MARGIN * bar
+            legend = "below" if bar or look.is_narrow(look.width_of(axes)) else "beside"
+        beside = look.legend_width(self.entries) if legend == "beside" else look.MARGIN * bar
         # A title above the axes alone meets no legend.
-        text = self.title_text(title, width_of(axes) - MARGIN - beside)
+        text = self.title_text(title, look.width_of(axes) - look.MARGIN - beside)
         axes.set_title(text, fontsize="medium")
-        place_legend(axes, self.entries, legend, handleheight=1.4)
+        look.place_legend(axes, self.entries, legend, handleheight=1.4)
 
     def label_axes(self, axes: Axes) -> None:
         """Write the labels of both axes."""
-        label_axes(axes, self.horizontal.label, self.vertical_label)
+        look.label_axes(axes, self.horizontal.label, self.vertical_label)
 
     def add_colour_bar(self, panels: list[Axes]) -> None:
         """Draw one colour bar beside the panels."""
         bar = ScalarMappable(self.scale.norm, self.scale.colours)
         ticks = MaxNLocator(integer=True) if self.data.dtype.kind in "iu" else None
-        figure: Any = panels[0].figure
-        label = folded([axis_label(self.data, self.ds)], 0.75 * height_of(panels[0]) * (1 + (len(panels) > 1)))
-        added = figure.colorbar(bar, ax=panels, label=label, ticks=ticks)
-        small_ticks(added.ax)
+        height = 0.75 * look.height_of(panels[0]) * (1 + (len(panels) > 1))
+        look.colour_bar(bar, panels, look.folded([labels.axis_label(self.data, self.ds)], height), ticks)
 
 
 def audit_texts(ds: xr.Dataset) -> list[str]:
@@ -571,7 +542,7 @@ def _panels(ds: xr.Dataset, dims: list[str]) -> list[tuple[list[str], dict[str, 
     panels = []
     for position in np.ndindex(*sizes):
         index = dict(zip(dims, map(int, position), strict=True))
-        panels.append(([value_text(ds[dim][k]) for dim, k in index.items()], index))
+        panels.append(([labels.value_text(ds[dim][k]) for dim, k in index.items()], index))
     return panels
 
 

@@ -16,13 +16,13 @@ from matplotlib.colors import LogNorm, to_hex
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve
 from ringsweep.plots.labels import axis_label, displayed, in_units, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import ZERO, ColourScale
 from ringsweep.plots.maps import audit_texts
 from ringsweep.plots.saving import suffix_of
-from ringsweep.plots.style import CURVE_COLOURS, NO_VALUE
 from ringsweep.quantities.variables import swept
 from ringsweep.storage.files import check_writable, replacing
 
@@ -252,7 +252,7 @@ def _column(
         within = tuple(range(others, every.ndim))
         about["shares"] = [np.atleast_1d(flags[k].mean(axis=within)).ravel().tolist() for k in present]
         colours = [to_hex(scale.colours(k)) for k in present]
-        return positions, about, (colours or [NO_VALUE], -0.5, max(len(present), 1) - 0.5)
+        return positions, about, (colours or [look.NO_VALUE], -0.5, max(len(present), 1) - 0.5)
     colours = [to_hex(colour) for colour in scale.colours(np.linspace(0.0, 1.0, 64))]
     limits = float(scale.norm.vmin or 0.0), float(scale.norm.vmax or 0.0)
     return _packed(numbers, str(data.name).endswith("_error")), about, (colours, *limits)
@@ -334,7 +334,7 @@ def _document(sweep: _Sweep) -> Any:
         bars[name] = [models.ColorBar(**style, major_label_text_font_size=f"{size}px") for size in (12, 11)]
         for bar, side in zip(bars[name], ("right", "below"), strict=True):
             plot.add_layout(bar, side)
-    paint = models.LinearColorMapper(palette=[NO_VALUE], nan_color=NO_VALUE)
+    paint = models.LinearColorMapper(palette=[look.NO_VALUE], nan_color=look.NO_VALUE)
     line, curve = None, []
     if sweep.scattered:
         columns, rows = np.arange(sweep.size), np.zeros(1, dtype=np.intp)
@@ -360,13 +360,13 @@ def _document(sweep: _Sweep) -> Any:
         plot.quad("left", "right", "bottom", "top", source=doubtful, **style)
         if vertical is None:
             line = models.ColumnDataSource({"x": horizontal.values, "value": np.zeros(sweep.size, dtype=np.float32)})
-            style = {"color": CURVE_COLOURS[0], "source": line}
+            style = {"color": look.CURVE_COLOURS[0], "source": line}
             curve = [plot.line("x", "value", **style), plot.scatter("x", "value", size=5, **style)]
-    look = {"stylesheets": [models.InlineStyleSheet(css=_DARK)], "sizing_mode": "stretch_width"}
+    choice = {"stylesheets": [models.InlineStyleSheet(css=_DARK)], "sizing_mode": "stretch_width"}
     names = [(name, about["title"]) for name, about in sweep.variables.items()]
-    variable = models.Select(title="variable", value=sweep.var, options=names, **look)
+    variable = models.Select(title="variable", value=sweep.var, options=names, **choice)
     slices = [
-        models.Select(title="slice", value="0", options=[(str(k), text) for k, text in enumerate(texts)], **look)
+        models.Select(title="slice", value="0", options=[(str(k), text) for k, text in enumerate(texts)], **choice)
         for texts in sweep.slices
     ]
     show = models.CustomJS(

@@ -18,39 +18,21 @@ from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.datasets import FLIGHT, PIVOT, mode_name, on_ring, require_history, zones
 from ringsweep.plots.labels import label_axis
 from ringsweep.plots.rig import Rig, belt_history, ring_history
-from ringsweep.plots.style import (
-    OPEN,
-    PAIR_COLOURS,
-    PAIR_STYLES,
-    SMALL,
-    angle_unit,
-    arc_colour,
-    arc_names,
-    axes_or_current,
-    figure_width,
-    is_narrow,
-    label_axes,
-    make_room,
-    on_page,
-    page_colour,
-    place_legend,
-    small_ticks,
-    true_ranges,
-)
 
 # In place of a mode: the velocity jumps.
 _JUMP = 4
 
 # Slip has the hue of the body; slip forward is darker.
 _MODE_STYLES: dict[int, dict[str, Any]] = {
-    1: {"color": PAIR_COLOURS[0], "linewidth": 1.1},
+    1: {"color": look.PAIR_COLOURS[0], "linewidth": 1.1},
     -1: {"color": "#56B4E9", "linewidth": 1.1},
     0: {"color": "black", "linewidth": 2.6, "solid_capstyle": "round"},
-    PIVOT: {"color": OPEN, "linewidth": 1.1, "linestyle": (0, (5, 1.5))},
-    FLIGHT: {"color": OPEN, "linewidth": 1.1, "linestyle": (0, (1, 1))},
+    PIVOT: {"color": look.OPEN, "linewidth": 1.1, "linestyle": (0, (5, 1.5))},
+    FLIGHT: {"color": look.OPEN, "linewidth": 1.1, "linestyle": (0, (1, 1))},
     _JUMP: {"color": "0.55", "linewidth": 0.6},
 }
 
@@ -102,15 +84,15 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     if frame == "ring":
         raise InputError("frame", "'ring' is for a body in a ring; on a belt the frame is 'space'")
     run = belt_history(ds)
-    ax = axes_or_current(ax, 0.9 if is_narrow(figure_width()) else 0.63)
-    place_legend(ax, draw_belt_portrait(ax, run))
-    make_room(ax)
+    ax = look.axes_or_current(ax, 0.9 if look.is_narrow(look.figure_width()) else 0.63)
+    look.place_legend(ax, draw_belt_portrait(ax, run))
+    look.make_room(ax)
     return ax
 
 
 def draw_belt_portrait(ax: Axes, run: xr.Dataset) -> list[Artist]:
     """Draw velocity over displacement of a run of :func:`belt_history`; returns the legend entries."""
-    small_ticks(ax)
+    look.small_ticks(ax)
     place, speed, belt_speed = (run[name].values for name in ("x", "velocity", "belt_velocity"))
     if fixed := not np.ptp(belt_speed):
         ax.axhline(belt_speed[0], **_driven_style(fixed))
@@ -126,8 +108,8 @@ def draw_belt_portrait(ax: Axes, run: xr.Dataset) -> list[Artist]:
 def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
     """Draw angular velocity over angle."""
     run, rig = ring_history(ds)
-    ax = axes_or_current(ax, 0.9 if is_narrow(figure_width()) else 0.63)
-    factor, unit = angle_unit()
+    ax = look.axes_or_current(ax, 0.9 if look.is_narrow(look.figure_width()) else 0.63)
+    factor, unit = look.angle_unit()
     relative = frame == "ring"
     fixed_arcs = relative or not run["theta"].values.any()
     angle = factor * (run["phi"].values - run["theta"].values if relative else run["phi"].values)
@@ -145,7 +127,7 @@ def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
     jumps = np.diff(run["time"].values) == 0.0
     jumps &= np.abs(np.diff(speed)) > 1e-6 * np.ptp(speed)
     entries += draw_modes(ax, run["mode"].values, angle, speed, wrapped, jumps)
-    label_axes(
+    look.label_axes(
         ax,
         f"angle of the body{' on the ring' if relative else ''} ({unit})",
         f"angular velocity{' relative to the ring' if relative else ''} (rad s$^{{-1}}$)",
@@ -158,19 +140,19 @@ def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
         to_sliding, to_angular = partial(np.multiply, rig.radius), partial(np.multiply, 1.0 / rig.radius)
         second = ax.secondary_yaxis("right", functions=(to_sliding, to_angular))
         second.set_ylabel("sliding velocity (m s$^{-1}$)")
-        second.tick_params(labelsize=SMALL)
+        second.tick_params(labelsize=look.SMALL)
     figure: Any = ax.figure
     # The second axis has its labels between axes and legend.
     labels = ScaledTranslation(0.065 * rcParams["font.size"] * relative, 0.0, figure.dpi_scale_trans)
-    place_legend(ax, entries, bbox_transform=ax.transAxes + labels, handleheight=1.2)
-    make_room(ax)
+    look.place_legend(ax, entries, bbox_transform=ax.transAxes + labels, handleheight=1.2)
+    look.make_room(ax)
     return ax
 
 
 def _driven_style(constant: bool) -> dict[str, Any]:
     """Line of the speed of ring or belt; a thin one over the broad curve of the body in stick, which would hide it."""
-    style: dict[str, Any] = {"color": on_page(PAIR_COLOURS[1]), "linewidth": 0.8, "zorder": 2.5}
-    return style | {"linestyle": PAIR_STYLES[1], "linewidth": 1.2} if constant else style
+    style: dict[str, Any] = {"color": look.pair(1), "linewidth": 0.8, "zorder": 2.5}
+    return style | {"linestyle": look.PAIR_STYLES[1], "linewidth": 1.2} if constant else style
 
 
 def draw_modes(
@@ -199,19 +181,19 @@ def draw_modes(
     between = np.where(mode[:-1] != 0, mode[:-1], mode[1:])
     if jumps is not None:
         between = np.where(jumps, _JUMP, between)
-    for value, look in _MODE_STYLES.items():
+    for value, usual in _MODE_STYLES.items():
         if not ((mode == value).any() or (between == value).any()):
             continue
-        style = look | {"color": on_page(look["color"])}
+        style = usual | {"color": look.on_page(usual["color"])}
         ax.plot(*_curve(*_segments(between == value, across, up), wrapped), **style)
         # In the frame of the ring or belt the curve of a stick may have no length.
         dot: dict[str, Any] = {"marker": "o", "markersize": 3.5} if value == 0 else {}
         if dot:
-            first = [i for i, _ in true_ranges(mode == value)]
+            first = [i for i, _ in look.true_ranges(mode == value)]
             ax.plot(_wrap(across[first], wrapped), up[first], color=style["color"], linestyle="", **dot)
         entries.append(Line2D([], [], **style, **dot, label="impact" if value == _JUMP else mode_name(value)))
-    ink = on_page("black")
-    for k, label, colour in ((0, "start", page_colour()), (-1, "end", ink)):
+    ink = look.on_page("black")
+    for k, label, colour in ((0, "start", look.page_colour()), (-1, "end", ink)):
         square: dict[str, Any] = {"marker": "s", "markersize": 5.5, "color": ink, "linestyle": ""}
         square["markerfacecolor"] = colour
         ax.plot(_wrap(across[[k]], wrapped), up[[k]], zorder=4, **square)
@@ -226,7 +208,7 @@ def _wrap(angle: NDArray[Any], wrapped: bool) -> NDArray[Any]:
 
 def _turn() -> float:
     """A full turn in the unit of angles."""
-    return 2.0 * math.pi * angle_unit()[0]
+    return 2.0 * math.pi * look.angle_unit()[0]
 
 
 def _curve(angle: NDArray[Any], speed: NDArray[Any], wrapped: bool) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -240,7 +222,7 @@ def _curve(angle: NDArray[Any], speed: NDArray[Any], wrapped: bool) -> tuple[NDA
 
 def _segments(kept: NDArray[Any], angle: NDArray[Any], speed: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     """Parts of a curve with NaN between them; `kept`, shape ``(samples - 1,)``, says from which sample to the next."""
-    pieces = [np.append(np.arange(i, j + 1), -1) for i, j in true_ranges(kept)]
+    pieces = [np.append(np.arange(i, j + 1), -1) for i, j in look.true_ranges(kept)]
     index = np.concatenate([*pieces, np.array([-1])])
     return np.where(index < 0, np.nan, angle[index]), np.where(index < 0, np.nan, speed[index])
 
@@ -251,17 +233,24 @@ def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[
     margin = 0.0 if wrapped else 0.05 * (high - low) or _turn() / 72.0
     low, high = low - margin, high + margin
     entries: list[Artist] = []
-    arcs = zip(arc_names(len(rig.arcs)), rig.arcs, strict=True)
+    arcs = zip(look.arc_names(len(rig.arcs)), rig.arcs, strict=True)
     for number, (name, (center, half_angle)) in enumerate(arcs, start=1):
         for contact in rig.contacts:
             lines = ("///", "\\\\\\")[contact - 1] if len(rig.contacts) > 1 else None
-            fill: dict[str, Any] = {"facecolor": arc_colour(number), "alpha": 0.35, "linewidth": 0}
-            hatch: dict[str, Any] = {"facecolor": "none", "edgecolor": on_page("0.45"), "linewidth": 0, "hatch": lines}
-            middle, half = angle_unit()[0] * (center - rig.offset(contact)), angle_unit()[0] * half_angle
+            fill: dict[str, Any] = {"facecolor": look.arc_colour(number), "alpha": 0.35, "linewidth": 0}
+            hatch: dict[str, Any] = {
+                "facecolor": "none",
+                "edgecolor": look.on_page("0.45"),
+                "linewidth": 0,
+                "hatch": lines,
+            }
+            middle, half = look.angle_unit()[0] * (center - rig.offset(contact)), look.angle_unit()[0] * half_angle
             for left, right in _every_turn(middle - half, middle + half, low, high):
                 ax.axvspan(left, right, zorder=0.5, **fill)
                 ax.axvspan(left, right, zorder=0.6, **hatch).set(hatch_linewidth=0.4)
-            entry = Patch(facecolor=arc_colour(number), alpha=0.55, hatch=lines, edgecolor=on_page("0.3"), linewidth=0)
+            entry = Patch(
+                facecolor=look.arc_colour(number), alpha=0.55, hatch=lines, edgecolor=look.on_page("0.3"), linewidth=0
+            )
             entry.set(label=f"contact {contact} on {name}", hatch_linewidth=0.4)
             entries.append(entry)
     ax.set_xlim(low, high)
@@ -283,9 +272,14 @@ def _draw_broad_lines(
     """Draw a broad line under the curve where a contact is on a zone; returns the legend entries."""
     arcs = np.array([run[name].values for name in zones(run)])
     entries: list[Artist] = []
-    for number, name in enumerate(arc_names(int(arcs.max())), start=1):
+    for number, name in enumerate(look.arc_names(int(arcs.max())), start=1):
         here = np.where((arcs == number).any(axis=0), 0.0, np.nan)
-        style: dict[str, Any] = {"color": arc_colour(number), "linewidth": 6, "alpha": 0.45, "solid_capstyle": "butt"}
+        style: dict[str, Any] = {
+            "color": look.arc_colour(number),
+            "linewidth": 6,
+            "alpha": 0.45,
+            "solid_capstyle": "butt",
+        }
         ax.plot(*_curve(angle, speed + here, wrapped), zorder=1.5, **style)
         entries.append(Line2D([], [], label=f"a contact on {name}", **style))
     return entries

@@ -13,26 +13,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon, Wedge
 from matplotlib.patheffects import withStroke
 from matplotlib.quiver import Quiver
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.datasets import mode_name
 from ringsweep.plots.labels import MINUS, TIMES, number_text
 from ringsweep.plots.rig import Rig, ring_history
-from ringsweep.plots.style import (
-    PAIR_COLOURS,
-    REST,
-    SMALL,
-    angle_unit,
-    arc_colour,
-    arc_names,
-    axes_or_current,
-    figure_width,
-    is_narrow,
-    on_page,
-    page_colour,
-    place_legend,
-)
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 
@@ -86,10 +74,10 @@ def polar_view(ds: xr.Dataset, time: float | str, ax: Axes | None = None) -> Axe
     time = quantity(time, Parameter("s", "time"), "time") if isinstance(time, str) else float(time)
     if not first <= time <= last:
         raise InputError("time", f"{time:g} s is not within the run, from {first:g} s to {last:.6g} s")
-    ax = axes_or_current(ax, 1.2 if is_narrow(figure_width()) else 0.8)
+    ax = look.axes_or_current(ax, 1.2 if look.is_narrow(look.figure_width()) else 0.8)
     artists = RingArtists(ax, run, rig)
     artists.show(states_at(run, np.array([time])), 0)
-    place_legend(ax, artists.legend_entries(), "below")
+    look.place_legend(ax, artists.entries, "below")
     return ax
 
 
@@ -101,11 +89,43 @@ def states_at(run: xr.Dataset, times: NDArray[np.float64]) -> dict[str, NDArray[
     return states | {"time": times, "mode": run["mode"].values[before]}
 
 
-class RingArtists:
-    """Artists of the body and the ring. They are made once; :meth:`show` moves them to an instant."""
+class Instant:
+    """Artists of a body at an instant. They are made once, and moved."""
+
+    def __init__(self, ax: Axes):
+        self.ax = ax
+        ax.set_axis_off()
+        ax.set_title(" ", fontsize="medium")
+        self.speeds = self.write(0.5, 0.0, "", transform=ax.transAxes, va="bottom")
+
+    def write(self, x: float, y: float, text: str, **style: Any) -> Text:
+        """A small text in the middle of a place."""
+        return self.ax.text(x, y, text, **{"ha": "center", "va": "center", "fontsize": look.SMALL} | style)
+
+    def name_of_force(self, name: str, colour: Any) -> Text:
+        """A name beside an arrow, visible on whatever lies below."""
+        halo = withStroke(linewidth=2.0, foreground=look.page_colour())
+        return self.write(0.0, 0.0, name, fontsize=None, color=colour, zorder=8, path_effects=[halo])
+
+    def draw_bar(self, left: float, y: float, length: float, texts: tuple[str, str], away: tuple[float, float]) -> None:
+        """Draw a scale bar with these texts this far above and below it."""
+        self.ax.plot([left, left + length], [y, y], marker="|", color=look.on_page("0.3"), linewidth=1.2)
+        self.write(left + length / 2, y + away[0], texts[0], va="bottom")
+        self.write(left + length / 2, y - away[1], texts[1], va="top")
+
+    def tell(self, states: dict[str, NDArray[Any]], k: int, names: dict[str, str], digits: int, unit: str) -> None:
+        """Write time and mode, and speeds: what moves by the variable."""
+        self.ax.set_title(f"t = {states['time'][k]:.4f} s, {mode_name(states['mode'][k])}", fontsize="medium")
+        texts = [f"{what} {number_text(states[name][k], f'+.{digits}f')} {unit}" for name, what in names.items()]
+        self.speeds.set_text(", ".join(texts))
+
+
+class RingArtists(Instant):
+    """Artists of the body and the ring. :meth:`show` moves them to an instant."""
 
     def __init__(self, ax: Axes, run: xr.Dataset, rig: Rig):
-        self.ax, self.rig = ax, rig
+        super().__init__(ax)
+        self.rig = rig
         self.weight = float(rig.body.mass * rig.body.gravity)
         self.reference = reference_force([run[f"normal_{k}"].values for k in rig.contacts], self.weight or 1.0)
         # Length of an arrow, m/N.
@@ -116,179 +136,143 @@ class RingArtists:
         self.magnification = max(1.0, float(f"{1.5 * self.reference / friction:.0e}")) if friction else 1.0
 
         R = rig.radius
-        ax.set_aspect("equal")
-        ax.set_axis_off()
-        ax.set_xlim(-1.55 * R, 1.55 * R)
-        ax.set_ylim(-2.0 * R, 1.5 * R)
-        edge, ink = on_page("0.3"), on_page("black")
+        ax.set(aspect="equal", xlim=(-1.55 * R, 1.55 * R), ylim=(-2.0 * R, 1.5 * R))
+        edge, dark, ink = map(look.on_page, ("0.3", "0.2", "black"))
         surface: dict[str, Any] = {"width": 0.1 * R, "edgecolor": edge}
-        ax.add_patch(Wedge((0.0, 0.0), 1.1 * R, 0.0, 360.0, facecolor=on_page(REST), zorder=1, **surface))
+        race = Wedge((0.0, 0.0), 1.1 * R, 0.0, 360.0, facecolor=look.on_page(look.REST), zorder=1, **surface)
         self._draw_angles()
         self.arcs = []
         for k, (_, half_angle) in enumerate(rig.arcs, start=1):
-            wedge = Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, facecolor=arc_colour(k), **surface)
+            wedge = Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, facecolor=look.arc_colour(k), **surface)
             wedge.set(zorder=2, visible=half_angle > 0.0)
             self.arcs.append(wedge)
-        self.mark = Polygon(np.zeros((3, 2)), facecolor=on_page("0.2"), edgecolor="none", zorder=3)
-        self.turning = Polygon(np.zeros((3, 2)), facecolor=on_page("0.2"), edgecolor="none", zorder=3)
-        (self.turn,) = ax.plot([], [], color=on_page("0.2"), linewidth=1.2, zorder=3)
-        (self.rod,) = ax.plot([], [], color=on_page("0.45"), linewidth=4, solid_capstyle="round", zorder=3)
-        self.balls = []
-        for _ in rig.contacts:
-            ball = Circle((0.0, 0.0), rig.ball, facecolor=on_page("0.85"), edgecolor=on_page("0.2"), zorder=4)
-            ball.set_linewidth(1.2)
-            self.balls.append(ball)
-        for patch in (*self.arcs, self.mark, self.turning, *self.balls):
+        self.mark, self.turning = (
+            Polygon(np.zeros((3, 2)), facecolor=dark, edgecolor="none", zorder=3) for _ in range(2)
+        )
+        (self.turn,) = ax.plot([], [], color=dark, linewidth=1.2, zorder=3)
+        (self.rod,) = ax.plot([], [], color=look.on_page("0.45"), linewidth=4, solid_capstyle="round", zorder=3)
+        ball: dict[str, Any] = {"facecolor": look.on_page("0.85"), "edgecolor": dark, "linewidth": 1.2, "zorder": 4}
+        self.balls = [Circle((0.0, 0.0), rig.ball, **ball) for _ in rig.contacts]
+        for patch in (race, *self.arcs, self.mark, self.turning, *self.balls):
             ax.add_patch(patch)
         # A single contact needs no number.
         texts = [str(k) if len(rig.contacts) > 1 else "" for k in rig.contacts]
-        self.numbers = [ax.text(0.0, 0.0, text, ha="center", va="center", fontsize=SMALL, zorder=5) for text in texts]
+        self.numbers = [self.write(0.0, 0.0, text, zorder=5) for text in texts]
         (self.centre,) = ax.plot([], [], marker="o", markersize=4, color=ink, linestyle="", zorder=5)
-        halo = withStroke(linewidth=2.0, foreground=page_colour())
-        colours = [on_page(PAIR_COLOURS[k - 1]) for k in rig.contacts]
+        colours = [look.pair(k - 1) for k in rig.contacts]
         self.reactions = self._arrows(colours, 0.032)
         self.frictions = self._arrows(colours, 0.016)
         self.gravity = self._arrows([ink], 0.016)
-        marks = [f"_{k}" if text else "" for k, text in zip(rig.contacts, texts, strict=True)]
-        names = [*(f"$N{mark}$" for mark in marks), *(f"$F{mark}$" for mark in marks), "$Mg$"]
-        self.names = [
-            ax.text(0.0, 0.0, name, color=colour, ha="center", va="center", zorder=8, path_effects=[halo])
-            for name, colour in zip(names, [*colours, *colours, ink], strict=True)
-        ]
+        forces = [f"${force}{text and f'_{text}'}$" for force in "NF" for text in texts]
+        pairs = zip([*forces, "$Mg$"], [*colours, *colours, ink], strict=True)
+        self.names = [self.name_of_force(name, colour) for name, colour in pairs]
         self._draw_scale_bars()
-        self.speeds = ax.text(0.5, 0.0, "", transform=ax.transAxes, ha="center", va="bottom", fontsize=SMALL)
-        ax.set_title(" ", fontsize="medium")
+        surfaces = [(look.arc_colour(k), name) for k, name in enumerate(look.arc_names(len(rig.arcs)), start=1)]
+        surfaces.append((look.on_page(look.REST), "elsewhere"))
+        #: Entries of a legend for the surfaces and the mark; arrows have their names beside them.
+        self.entries: list[Artist] = [Patch(facecolor=one, edgecolor=edge, label=name) for one, name in surfaces]
+        angle: dict[str, Any] = {"marker": "v", "color": dark, "linestyle": "", "markersize": 5}
+        self.entries.append(Line2D([], [], label="angle θ of the ring", **angle))
+        #: Artists that :meth:`show` changes.
+        self.moving: list[Artist] = [*self.arcs, self.mark, self.turn, self.turning, self.rod, *self.balls]
+        self.moving += [*self.numbers, self.centre, self.reactions, self.frictions, self.gravity]
+        self.moving += [*self.names, self.speeds, ax.title]
 
     def show(self, states: dict[str, NDArray[Any]], k: int) -> None:
         """Move all artists to the `k`-th state of :func:`states_at`."""
+        self._show_ring(float(states["theta"][k]), float(np.sign(states["ring_omega"][k])))
         rig, R = self.rig, self.rig.radius
-        theta = float(states["theta"][k])
-        ring_omega, omega = float(states["ring_omega"][k]), float(states["omega"][k])
-        for wedge, (center, half_angle) in zip(self.arcs, rig.arcs, strict=True):
-            middle = theta + center
-            # Matplotlib counts angles from the horizontal.
-            wedge.set_theta1(math.degrees(middle - half_angle) - 90.0)
-            wedge.set_theta2(math.degrees(middle + half_angle) - 90.0)
-        self.mark.set_xy([_point(1.12 * R, theta), _point(1.22 * R, theta - 0.05), _point(1.22 * R, theta + 0.05)])
-        # The arrow begins at the mark.
-        sense = float(np.sign(ring_omega))
-        along = theta + sense * np.linspace(0.09, 0.36, 20)
-        self.turn.set_data(*_point(1.18 * R, along))
-        end, tip = theta + sense * 0.34, theta + sense * 0.46
-        self.turning.set_xy([_point(1.18 * R, tip), _point(1.14 * R, end), _point(1.22 * R, end)])
-        for artist in (self.turn, self.turning):
-            artist.set_visible(sense != 0.0)
-        contacts = np.array([_point(R, states[f"alpha_{c}"][k]) for c in rig.contacts])
+        angles = np.array([states[f"alpha_{c}"][k] for c in rig.contacts])
+        contacts = np.column_stack(_point(R, angles))
         gaps = np.array([states[f"gap_{c}"][k] if f"gap_{c}" in states else 0.0 for c in rig.contacts])
         centres = contacts * (1.0 - (rig.ball + gaps) / R)[:, None]
         self.rod.set_data(*centres.T)
         inwards = -contacts / R
         forwards = np.column_stack([inwards[:, 1], -inwards[:, 0]])
-        for c, ball, number, at, forward in zip(rig.contacts, self.balls, self.numbers, centres, forwards, strict=True):
+        for side, ball, number, at, forward in zip((-1, 1), self.balls, self.numbers, centres, forwards, strict=False):
             ball.set_center(tuple(at))
             # The arrow of the reaction passes through the centre of the ball.
-            number.set_position(tuple(at + (0.55 if c == 2 else -0.55) * rig.ball * forward))
-        centre_of_mass = np.array([states["x"][k], states["y"][k]])
-        self.centre.set_data(*centre_of_mass[:, None])
-        normals = np.array([states[f"normal_{c}"][k] for c in rig.contacts])
-        frictions = np.array([states[f"friction_{c}"][k] for c in rig.contacts])
-        reactions = inwards * (normals * self.scale)[:, None]
-        frictions = forwards * (frictions * self.scale * self.magnification)[:, None]
-        weight = np.array([[0.0, -self.weight * self.scale]])
-        _set_arrows(self.reactions, contacts, reactions)
-        _set_arrows(self.frictions, contacts, frictions)
-        _set_arrows(self.gravity, centre_of_mass[None], weight)
-        starts = np.concatenate([contacts, contacts])
-        *names, weight_name = self.names
-        for j, (name, start, arrow) in enumerate(
-            zip(names, starts, np.concatenate([reactions, frictions]), strict=True)
+            number.set_position(tuple(at + 0.55 * side * rig.ball * forward))
+        centre = np.array([states["x"][k], states["y"][k]])
+        self.centre.set_data(*centre[:, None])
+        normals, frictions = (
+            np.array([[states[f"{name}_{c}"][k] * self.scale] for c in rig.contacts]) for name in ("normal", "friction")
+        )
+        reactions, frictions = normals * inwards, frictions * self.magnification * forwards
+        weight = np.array([0.0, -self.weight * self.scale])
+        for arrows, points, vectors in (
+            (self.reactions, contacts, reactions),
+            (self.frictions, contacts, frictions),
+            (self.gravity, centre[None], weight[None]),
         ):
-            length = float(np.hypot(*arrow))
+            arrows.set_offsets(points)
+            arrows.set_UVC(*vectors.T)
+        count = len(contacts)
+        for j, (name, arrow) in enumerate(zip(self.names, [*reactions, *frictions], strict=False)):
+            c, length = j % count, float(np.hypot(*arrow))
             name.set_visible(length > _SHORTEST * R)
             if not name.get_visible():
                 continue
-            c = j % len(contacts)
-            if j < len(contacts):
-                # The ball would hide the name of a short reaction.
-                beyond = max(length, 2.0 * rig.ball + gaps[c])
-                name.set_position(tuple(start + arrow * ((beyond + 0.12 * R) / length)))
-            elif length < _LONG * R:
+            if j >= count and length < _LONG * R:
                 # Beside ball and rim, in the free space within the ring.
                 away = max(length / R + 0.06, 0.15 + rig.ball / R) * float(np.sign(arrow @ forwards[c]))
-                name.set_position(_point(0.87 * R, float(states[f"alpha_{rig.contacts[c]}"][k]) + away))
+                name.set_position(_point(0.87 * R, angles[c] + away))
             else:
-                name.set_position(tuple(start + arrow * (1.0 + 0.12 * R / length)))
+                # The ball would hide the name of a short reaction.
+                tip = length if j >= count else max(length, 2.0 * rig.ball + gaps[c])
+                name.set_position(tuple(contacts[c] + arrow * ((tip + 0.12 * R) / length)))
         # At the tip would be the number of the angle 0.
-        weight_name.set_position(tuple(centre_of_mass + 0.6 * weight[0] + (0.13 * R, 0.0)))
-        weight_name.set_visible(self.weight > 0.0)
-        self.ax.set_title(f"t = {states['time'][k]:.4f} s, {mode_name(states['mode'][k])}", fontsize="medium")
-        self.speeds.set_text(
-            f"body {number_text(omega, '+.2f')} rad s⁻¹, ring {number_text(ring_omega, '+.2f')} rad s⁻¹"
-        )
+        self.names[-1].set(position=tuple(centre + 0.6 * weight + (0.13 * R, 0.0)), visible=self.weight > 0.0)
+        self.tell(states, k, {"omega": "body", "ring_omega": "ring"}, 2, "rad s⁻¹")
 
-    @property
-    def moving(self) -> list[Artist]:
-        """Artists that :meth:`show` changes."""
-        arrows = [self.reactions, self.frictions, self.gravity]
-        body = [self.rod, *self.balls, *self.numbers, self.centre]
-        ring = [*self.arcs, self.mark, self.turn, self.turning]
-        return [*ring, *body, *arrows, *self.names, self.speeds, self.ax.title]
-
-    def legend_entries(self) -> list[Artist]:
-        """Legend entries of the surfaces and the mark; arrows have their names beside them."""
-        entries: list[Artist] = [
-            Patch(facecolor=arc_colour(k), edgecolor=on_page("0.3"), label=name)
-            for k, name in enumerate(arc_names(len(self.rig.arcs)), start=1)
-        ]
-        entries.append(Patch(facecolor=on_page(REST), edgecolor=on_page("0.3"), label="elsewhere"))
-        style: dict[str, Any] = {"marker": "v", "color": on_page("0.2"), "linestyle": "", "markersize": 5}
-        return [*entries, Line2D([], [], label="angle θ of the ring", **style)]
+    def _show_ring(self, theta: float, sense: float) -> None:
+        """Turn the ring to an angle; `sense` is the sign of its angular velocity."""
+        R = self.rig.radius
+        for wedge, (center, half_angle) in zip(self.arcs, self.rig.arcs, strict=True):
+            # Matplotlib counts angles from the horizontal.
+            ends = np.degrees(theta + center + np.array([-half_angle, half_angle])) - 90.0
+            wedge.set(theta1=ends[0], theta2=ends[1])
+        self.mark.set_xy([_point(1.12 * R, theta), _point(1.22 * R, theta - 0.05), _point(1.22 * R, theta + 0.05)])
+        # The arrow begins at the mark.
+        self.turn.set_data(*_point(1.18 * R, theta + sense * np.linspace(0.09, 0.36, 20)))
+        end, tip = theta + sense * 0.34, theta + sense * 0.46
+        self.turning.set_xy([_point(1.18 * R, tip), _point(1.14 * R, end), _point(1.22 * R, end)])
+        for artist in (self.turn, self.turning):
+            artist.set_visible(sense != 0.0)
 
     def _draw_angles(self) -> None:
         """Ticks and labels of angles around the ring."""
         R = self.rig.radius
-        for angle in range(0, 360, 15):
-            inner, outer = _point(1.1 * R, math.radians(angle)), _point(1.13 * R, math.radians(angle))
-            self.ax.plot(*zip(inner, outer, strict=True), color=on_page("0.5"), linewidth=0.6, zorder=1)
+        for angle in np.radians(range(0, 360, 15)):
+            ends = zip(_point(1.1 * R, angle), _point(1.13 * R, angle), strict=True)
+            self.ax.plot(*ends, color=look.on_page("0.5"), linewidth=0.6, zorder=1)
         degrees = {angle: number_text(angle, "d") + "°" for angle in (0, 90, 180, -90)}
         radians = {0: "0", 90: "π/2", 180: "π", -90: f"{MINUS}π/2"}
-        for angle, name in (degrees if angle_unit()[1] == "°" else radians).items():
-            x, y = _point(1.37 * R, math.radians(angle))
-            self.ax.text(x, y, name, fontsize=SMALL, color=on_page("0.35"), ha="center", va="center", zorder=7)
+        for angle, name in (degrees if look.angle_unit()[1] == "°" else radians).items():
+            self.write(*_point(1.37 * R, math.radians(angle)), name, color=look.on_page("0.35"), zorder=7)
 
     def _arrows(self, colours: list[str], width: float) -> Quiver:
         """An arrow of each colour; `width` is a multiple of the radius of the ring."""
         # With long heads short arrows would all look alike.
-        look = ARROWS | {"headwidth": 3.2, "headlength": 3.6, "headaxislength": 3.2, "width": width * self.rig.radius}
-        return self.ax.quiver(*np.zeros((4, len(colours))), color=colours, units="xy", **look)
+        arrow = ARROWS | {"headwidth": 3.2, "headlength": 3.6, "headaxislength": 3.2, "width": width * self.rig.radius}
+        return self.ax.quiver(*np.zeros((4, len(colours))), color=colours, units="xy", **arrow)
 
     def _draw_scale_bars(self) -> None:
         """Bars of round forces and of a round length below the ring."""
-        R = self.rig.radius
-        y = -1.62 * R
+        R, factor = self.rig.radius, self.magnification
         force, length = round_down(0.75 * self.reference), round_down(0.5 * R)
-        magnified = self.magnification > 1.0
-        bars = [(force * self.scale, f"{force:g} N", "$N$, $Mg$" if magnified else "$N$, $F$, $Mg$")]
-        if magnified:
-            friction = round_down(0.75 * self.reference / self.magnification)
-            extent = friction * self.scale * self.magnification
-            bars.append((extent, f"{friction:g} N", f"$F$ ({TIMES}{self.magnification:g})"))
+        bars = [(force * self.scale, f"{force:g} N", "$N$, $Mg$" if factor > 1.0 else "$N$, $F$, $Mg$")]
+        if factor > 1.0:
+            friction = round_down(0.75 * self.reference / factor)
+            bars.append((friction * self.scale * factor, f"{friction:g} N", f"$F$ ({TIMES}{factor:g})"))
         bars.append((length, f"{1000 * length:g} mm", ""))
-        style: dict[str, Any] = {"color": on_page("0.3"), "linewidth": 1.2}
-        for x, (extent, text, what) in zip((-1.4 * R, -0.35 * R, 0.7 * R), bars, strict=False):
-            self.ax.plot([x, x + extent], [y, y], marker="|", **style)
-            self.ax.text(x + extent / 2, y + 0.05 * R, text, ha="center", va="bottom", fontsize=SMALL)
-            self.ax.text(x + extent / 2, y - 0.08 * R, what, ha="center", va="top", fontsize=SMALL)
+        for x, (extent, *texts) in zip((-1.4 * R, -0.35 * R, 0.7 * R), bars, strict=False):
+            self.draw_bar(x, -1.62 * R, extent, (texts[0], texts[1]), (0.05 * R, 0.08 * R))
 
 
 def _point(radius: float, angle: Any) -> tuple[Any, Any]:
     """Point at an angle, or points at several, from the downward vertical, counter-clockwise."""
     return radius * np.sin(angle), -radius * np.cos(angle)
-
-
-def _set_arrows(arrows: Quiver, points: NDArray[Any], vectors: NDArray[Any]) -> None:
-    arrows.set_offsets(points)
-    arrows.set_UVC(*vectors.T)
 
 
 def reference_force(forces: list[NDArray[Any]], default: float, outlier: float = 3.0) -> float:

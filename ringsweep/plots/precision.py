@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import resolve
 from ringsweep.plots.labels import axis_label, number_text
-from ringsweep.plots.style import (
+from ringsweep.plots.look import (
     CURVE_COLOURS,
     CURVE_STYLES,
     GRID,

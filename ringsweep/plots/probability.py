@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib import rcParams
@@ -9,21 +11,11 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from matplotlib.ticker import PercentFormatter
+from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.datasets import require_sample
-from ringsweep.plots.style import (
-    NO_VALUE,
-    PAIR_COLOURS,
-    REGIME_COLOURS,
-    axes_or_current,
-    folded,
-    label_axes,
-    make_room,
-    on_page,
-    place_legend,
-    width_of,
-)
 
 
 def probability_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -57,20 +49,29 @@ def probability_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     ['oscillatory', 'separating']
     """
     ds = require_sample(ds, "probability")
-    ax = axes_or_current(ax, 0.5)
+    ax = look.axes_or_current(ax, 0.5)
     ds = ds.isel(word=ds["probability"].values > 0.0)
     words = list(map(str, ds["word"].values))
-    place = np.arange(len(words))
-    share = ds["probability"].values
-    ends = np.abs(np.stack([share - ds["probability_low"].values, ds["probability_high"].values - share]))
-    colours = [on_page(REGIME_COLOURS.get(word, NO_VALUE)) for word in words]
-    ax.barh(place, share, xerr=ends, color=colours, ecolor=rcParams["text.color"], capsize=3)
-    ax.set_yticks(place, words)
-    ax.invert_yaxis()
-    ax.set_xlim(0.0, 1.0)
+    colours = [look.on_page(look.REGIME_COLOURS.get(word, look.NO_VALUE)) for word in words]
+    _draw_bars(ax, ds, "probability", np.arange(len(words)), color=colours)
+    _name_bars(ax, words)
     ax.xaxis.set_major_formatter(PercentFormatter(1.0))
     ax.set_xlabel("probability (95 % interval)")
     return ax
+
+
+def _draw_bars(ax: Axes, ds: xr.Dataset, name: str, place: NDArray[Any], **style: Any) -> None:
+    """Draw a variable and its 95 % interval as horizontal bars."""
+    value = ds[name].values
+    ends = [np.abs(ds[f"{name}{end}"].values - value) for end in ("_low", "_high")]
+    ax.barh(place, value, xerr=ends, ecolor=rcParams["text.color"], capsize=3, **style)
+
+
+def _name_bars(ax: Axes, names: list[str]) -> None:
+    """Write a name beside each bar, the first at the top; a bar ends at 1."""
+    ax.set_yticks(np.arange(len(names)), names)
+    ax.invert_yaxis()
+    ax.set_xlim(0.0, 1.0)
 
 
 def survival_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -104,22 +105,20 @@ def survival_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     'body still holds its contacts'
     """
     ds = require_sample(ds, "survival")
-    ax = axes_or_current(ax, 0.5)
-    time, colour = ds["survival_time"].values, on_page(PAIR_COLOURS[0])
-    ax.fill_between(
-        time, ds["survival_low"].values, ds["survival_high"].values, color=colour, alpha=0.3, linewidth=0, step="post"
-    )
+    ax = look.axes_or_current(ax, 0.5)
+    time, colour = ds["survival_time"].values, look.pair(0)
+    look.band(ax, time, ds["survival_low"].values, ds["survival_high"].values, colour, step="post")
     ax.step(time, ds["survival"].values, color=colour, where="post")
     ax.set_ylim(0.0, 1.02)
     ax.yaxis.set_major_formatter(PercentFormatter(1.0))
     what = "rides" if ds.attrs.get("survival_of") == "first_slip" else "holds its contacts"
-    label_axes(ax, "time (s)", f"body still {what}")
-    make_room(ax)
+    look.label_axes(ax, "time (s)", f"body still {what}")
+    look.make_room(ax)
     return ax
 
 
 def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None = None) -> Axes:
-    """Draw Sobol indices, or Morris's effects, of the indicator of a regime as bars with 95 % intervals.
+    """Draw Sobol indices of the indicator of a regime as bars with 95 % intervals.
 
     Parameters
     ----------
@@ -150,31 +149,21 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     >>> [label.get_text() for label in sensitivity_panel(ds).get_yticklabels()]
     ['friction.rest.mu_k', 'zone.half_angle']
     """
-    screened = "morris_mu_star" in ds
-    names = ("morris_mu_star", "morris_sigma") if screened else ("sobol_first", "sobol_total")
-    labels = ("mean magnitude", "standard deviation") if screened else ("first: alone", "total: with the others")
-    ds = require_sample(ds, names[0])
+    ds = require_sample(ds, "sobol_first")
     if word is None:
         word = str(ds["word"].values[int(np.argmin(np.abs(ds["probability"].values - 0.5)))])
     if word not in ds["word"].values:
         raise InputError("word", f"{word!r} is no regime: {', '.join(map(str, ds['word'].values))}")
-    ax = axes_or_current(ax, 0.5)
+    ax = look.axes_or_current(ax, 0.5)
     ds = ds.sel(word=word)
-    place = np.arange(ds.sizes["parameter"])
-    for k, name in enumerate(names):
-        index = ds[name].values
-        # The standard deviation of effects has no interval.
-        ends = [np.abs(ds.get(f"{name}{end}", ds[name]).values - index) for end in ("_low", "_high")]
-        style = {"color": on_page(PAIR_COLOURS[k]), "ecolor": rcParams["text.color"], "capsize": 3}
-        ax.barh(place + 0.4 * k - 0.2, index, 0.36, xerr=None if name == "morris_sigma" else ends, **style)
-    ax.set_yticks(place, list(map(str, ds["parameter"].values)))
-    ax.invert_yaxis()
-    ax.set_xlim(0.0, 2.0 if screened else 1.0)
-    share = float(ds["probability"])
-    ax.set_xlabel(("elementary effect" if screened else "Sobol index") + " (95 % interval)")
-    ax.set_title(folded([f"what {word} depends on", f"probability {share:.1%}"], width_of(ax)), fontsize="medium")
-    handles: list[Artist] = [
-        Patch(color=on_page(colour), label=label) for colour, label in zip(PAIR_COLOURS, labels, strict=True)
-    ]
-    place_legend(ax, handles, "below")
+    handles: list[Artist] = []
+    for k, (name, text) in enumerate((("first", "first: alone"), ("total", "total: with the others"))):
+        colour, place = look.pair(k), np.arange(ds.sizes["parameter"]) + 0.4 * k - 0.2
+        _draw_bars(ax, ds, f"sobol_{name}", place, height=0.36, color=colour)
+        handles.append(Patch(color=colour, label=text))
+    _name_bars(ax, list(map(str, ds["parameter"].values)))
+    ax.set_xlabel("Sobol index (95 % interval)")
+    title = [f"what {word} depends on", f"probability {float(ds['probability']):.1%}"]
+    ax.set_title(look.folded(title, look.width_of(ax)), fontsize="medium")
+    look.place_legend(ax, handles, "below")
     return ax

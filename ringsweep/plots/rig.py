@@ -9,11 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.compile import take
-from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.models import model_of
-from ringsweep.physics import contact, ring
 from ringsweep.plots.datasets import on_ring, open_contacts, phases, require_history, require_one_run
 from ringsweep.quantities.variables import configuration_of
 
@@ -50,6 +46,12 @@ class Rig:
     @classmethod
     def of(cls, ds: xr.Dataset) -> Rig:
         """Measures of the scene in the attribute ``configuration`` of a dataset."""
+        # Models are slow to import, and most pictures need none.
+        from ringsweep.compile import take
+        from ringsweep.config import load
+        from ringsweep.models import model_of
+        from ringsweep.physics import ring
+
         scene = load(configuration_of(ds)).scene
         model: Any = model_of(scene.structure)
         bodies = model.build_body({path: np.array([value]) for path, value in scene.values.items()})
@@ -109,6 +111,8 @@ def _on_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
 
 def _friction(body: Any, phi: Any, omega: Any, epsilon: Any, normals: list[Any]) -> list[Any]:
     """Friction at each contact, N: that at contact 2 follows from the reactions, which are linear in it."""
+    from ringsweep.physics import contact, ring
+
     *at_zero, first = ring.held(body, 1.0, (np.sin(phi), np.cos(phi), omega), omega**2, epsilon, 0.0)
     if len(normals) == 1:
         return [first]
@@ -163,3 +167,11 @@ def belt_history(ds: xr.Dataset) -> xr.Dataset:
     if on_ring(require_history(ds)):
         raise InputError("ds", "is the history of a body in a ring: there is no belt to draw")
     return require_one_run(ds, ("x", "velocity", "friction_force", "belt_x", "belt_velocity", "mode"))
+
+
+def has_spring(ds: xr.Dataset) -> bool:
+    """Whether the body of a run on a belt hangs on a spring."""
+    from ringsweep.config import load
+
+    values = load(configuration_of(ds)).scene.values
+    return any(value for path, value in values.items() if path.startswith("spring."))

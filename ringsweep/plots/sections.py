@@ -16,27 +16,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import blended_transform_factory
+from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.datasets import resolve, scene_text
 from ringsweep.plots.labels import display_factor, unit_text
 from ringsweep.plots.map_axes import Axis
 from ringsweep.plots.selection import select
-from ringsweep.plots.style import (
-    NO_VALUE,
-    PAIR_COLOURS,
-    REGIME_COLOURS,
-    SMALL,
-    STICK,
-    axes_or_current,
-    figure_width,
-    folded,
-    label_axes,
-    legend_above,
-    on_page,
-    small_ticks,
-    true_ranges,
-)
 from ringsweep.quantities.variables import POINTS, words
 
 # Their full names would take half of a narrow picture.
@@ -107,30 +94,21 @@ def bifurcation(
     1
     """
     ds, held = select(ds, sel or {})
-    _require_diagram(ds)
-    below = [name for name in ("lyapunov", "multiplier_1") if name in ds and bool(np.isfinite(ds[name]).any())]
+    axis = _axis(ds, x)
+    below = {name: draw for name, draw in _BELOW.items() if name in ds and bool(np.isfinite(ds[name]).any())}
     heights = [_HEIGHTS[name] for name in ("diagram", *below)]
-    width = figure_width()
+    width = look.figure_width()
     figure = Figure(figsize=(width, sum(heights) * width + 0.6), layout="constrained")
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     bifurcation_panel(ds, x, var, panels[0])
-    for name, ax in zip(below, panels[1:], strict=True):
-        if name == "multiplier_1":
-            multiplier_panel(ds, x, ax)
-            if _DIRECTION in ds.dims:
-                # The diagram has the key to the directions; theirs would cover the name of the axis.
-                handles, texts = ax.get_legend_handles_labels()
-                both = zip(handles[:2], texts[:2], strict=True)
-                colour = rcParams["text.color"]
-                legend_above(ax, [_dot(drawn.get_marker(), colour, text.split(", ")[1]) for drawn, text in both])
-        elif (legend := exponent_panel(ds, x, ax).get_legend()) is not None:
-            # The panel above has the key to the directions.
-            legend.remove()
+    for draw, ax in zip(below.values(), panels[1:], strict=True):
+        # The diagram has the key to the directions.
+        look.legend_above(ax, draw(ax, axis, ds))
     for ax in panels[:-1]:
         ax.set_xlabel("")
         ax.tick_params(labelbottom=False, which="both")
-    if text := folded([*scene_text(ds), *held], width):
-        figure.suptitle(text, fontsize=SMALL)
+    if text := look.folded([*scene_text(ds), *held], width):
+        figure.suptitle(text, fontsize=look.SMALL)
     return figure
 
 
@@ -167,22 +145,16 @@ def bifurcation_panel(ds: xr.Dataset, x: str | None = None, var: str | None = No
     axis = _axis(ds, x)
     known = points_of(ds)
     name = resolve("var", var, known) if var else known[0]
-    ax = axes_or_current(ax, _HEIGHTS["diagram"])
-    handles: list[Artist] = []
-    branches = list(_branches(ds))
+    ax = look.axes_or_current(ax, _HEIGHTS["diagram"])
+    branches = _branches(ds)
     # Where both branches are the same, the second one must not hide the first: it has smaller points.
-    for k, (way, branch) in enumerate(branches):
+    for k, (_, branch) in enumerate(branches):
         points = axis.along(branch[name]) * display_factor(ds[name])
-        colour = on_page(PAIR_COLOURS[k])
-        place = np.repeat(axis.values, points.shape[1])
         size = _DOT * (2.5 if k == 0 and len(branches) > 1 else 1.0)
-        ax.scatter(place, points.ravel(), s=size, color=colour, linewidths=0, rasterized=True, zorder=2 + k)
-        if way:
-            handles.append(_dot("o", colour, way))
-    if "regime" in ds:
-        handles += _strips(ax, axis, ds)
+        _scatter(ax, np.repeat(axis.values, points.shape[1]), points.ravel(), s=size, color=look.pair(k), zorder=2 + k)
+    regimes = _strips(ax, axis, ds) if "regime" in ds else []
     _finish(ax, axis, _label(ds, name))
-    legend_above(ax, handles)
+    look.legend_above(ax, [*_directions(ds), *regimes])
     return ax
 
 
@@ -190,14 +162,13 @@ def _strips(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
     """Draw the regimes as a strip at the upper edge for each direction, the first at the top; entries of a legend."""
     found: dict[str, Artist] = {}
     across = blended_transform_factory(ax.transData, ax.transAxes)
-    edges = axis.edges
-    branches = list(_branches(ds))
-    for k, (_, branch) in enumerate(branches):
+    edges, branches = axis.edges, _branches(ds)
+    for k, (_, branch) in enumerate(branches, start=1):
         regime = axis.along(words(branch["regime"])).astype(str)
         for word in dict.fromkeys(regime.tolist()):
-            colour = on_page(REGIME_COLOURS.get(word, NO_VALUE))
-            spans = [(edges[a], edges[b] - edges[a]) for a, b in true_ranges(regime == word)]
-            strip = (1.0 - (k + 1) * _STRIP, _STRIP)
+            colour = look.on_page(look.REGIME_COLOURS.get(word, look.NO_VALUE))
+            spans = [(edges[a], edges[b] - edges[a]) for a, b in look.true_ranges(regime == word)]
+            strip = (1.0 - k * _STRIP, _STRIP)
             ax.broken_barh(spans, strip, transform=across, facecolors=colour, linewidth=0, zorder=5)
             found.setdefault(word, Patch(color=colour, label=word))
     low, high = ax.get_ylim()
@@ -238,15 +209,14 @@ def section_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     if ds[place].dims != ("section",):
         several = ", ".join(str(dim) for dim in ds[place].dims if dim != "section")
         raise InputError("ds", f"has sections along {several}, and this picture shows one: choose a cell by ds.sel")
-    ax = axes_or_current(ax, 0.75)
+    ax = look.axes_or_current(ax, 0.75)
     x, velocity = (ds[name].values * display_factor(ds[name]) for name in (place, speed))
     kept = np.isfinite(x) & np.isfinite(velocity)
     order = np.arange(1, kept.sum() + 1)
-    drawn = ax.scatter(x[kept], velocity[kept], c=order, s=8.0, cmap="viridis", linewidths=0, rasterized=True)
-    label_axes(ax, _label(ds, place), _label(ds, speed))
+    drawn = _scatter(ax, x[kept], velocity[kept], c=order, s=8.0, cmap="viridis")
+    look.label_axes(ax, _label(ds, place), _label(ds, speed))
     if len(order) > 1:
-        bar = ax.figure.colorbar(drawn, ax=ax, label="point, in time", ticks=MaxNLocator(6, integer=True))
-        small_ticks(bar.ax)
+        look.colour_bar(drawn, [ax], "point, in time", MaxNLocator(6, integer=True))
     return ax
 
 
@@ -280,23 +250,26 @@ def exponent_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = None)
     'speed'
     """
     axis = _axis(ds, x, "lyapunov")
-    ax = axes_or_current(ax, _HEIGHTS["lyapunov"])
+    ax = look.axes_or_current(ax, _HEIGHTS["lyapunov"])
+    look.legend_above(ax, [*_directions(ds), *_draw_exponents(ax, axis, ds)])
+    return ax
+
+
+def _draw_exponents(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
+    """Draw exponents; no entries of a legend."""
     ax.axhline(0.0, color=rcParams["axes.edgecolor"], linewidth=0.8, zorder=1)
-    for k, (way, branch) in enumerate(_branches(ds)):
+    for k, (_, branch) in enumerate(_branches(ds)):
         value = axis.along(branch["lyapunov"])
-        colour = on_page(PAIR_COLOURS[k])
         finite = np.where(np.isfinite(value), value, np.nan)
-        ax.plot(axis.values, finite, ".-", color=colour, markersize=2, linewidth=0.8, label=way or None)
+        ax.plot(axis.values, finite, ".-", color=look.pair(k), markersize=2, linewidth=0.8)
         if "lyapunov_error" in branch:
             error = axis.along(branch["lyapunov_error"])
-            band = finite - error, finite + error
-            ax.fill_between(axis.values, *band, color=colour, alpha=0.3, linewidth=0)
+            look.band(ax, axis.values, finite - error, finite + error, look.pair(k))
         erased = axis.values[np.isneginf(value)]
         edge = blended_transform_factory(ax.transData, ax.transAxes)
-        ax.plot(erased, np.full(len(erased), 0.03), "v", transform=edge, color=colour, markersize=2)
+        ax.plot(erased, np.full(len(erased), 0.03), "v", transform=edge, color=look.pair(k), markersize=2)
     _finish(ax, axis, "exponent (s$^{-1}$)")
-    legend_above(ax)
-    return ax
+    return []
 
 
 def multiplier_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = None) -> Axes:
@@ -327,18 +300,24 @@ def multiplier_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = Non
     'speed'
     """
     axis = _axis(ds, x, "multiplier_1")
-    ax = axes_or_current(ax, _HEIGHTS["multiplier_1"])
-    ax.axhspan(0.0, 1.0, color=on_page(STICK), linewidth=0, zorder=0)
-    for k, (way, branch) in enumerate(_branches(ds)):
-        for name, dots, which in (("multiplier_1", ".", "larger one"), ("multiplier_2", "x", "smaller one")):
-            if name in branch:
-                value = axis.along(branch[name])
-                label = f"{way}, {which}" if way else which
-                ax.plot(axis.values, value, dots, color=on_page(PAIR_COLOURS[k]), markersize=2.5, label=label)
+    ax = look.axes_or_current(ax, _HEIGHTS["multiplier_1"])
+    look.legend_above(ax, [*_directions(ds), *_draw_multipliers(ax, axis, ds)])
+    return ax
+
+
+def _draw_multipliers(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
+    """Draw magnitudes of multipliers; returns the entries of a legend for the larger and the smaller one."""
+    ax.axhspan(0.0, 1.0, color=look.on_page(look.STICK), linewidth=0, zorder=0)
+    marks = {name: mark for name, mark in (("multiplier_1", "."), ("multiplier_2", "x")) if name in ds}
+    for k, (_, branch) in enumerate(_branches(ds)):
+        for name, mark in marks.items():
+            ax.plot(axis.values, axis.along(branch[name]), mark, color=look.pair(k), markersize=2.5)
     ax.set_ylim(0.0, max(1.1, ax.get_ylim()[1]))
     _finish(ax, axis, "multipliers")
-    legend_above(ax)
-    return ax
+    return [_dot(mark, text) for mark, text in zip(marks.values(), ("larger one", "smaller one"), strict=False)]
+
+
+_BELOW = {"lyapunov": _draw_exponents, "multiplier_1": _draw_multipliers}
 
 
 def multiplier_circle(ds: xr.Dataset, x: str | None = None, ax: Axes | None = None) -> Axes:
@@ -372,43 +351,44 @@ def multiplier_circle(ds: xr.Dataset, x: str | None = None, ax: Axes | None = No
     'real part of the multipliers'
     """
     axis = _axis(ds, x, "multiplier_angle_1")
-    ax = axes_or_current(ax, _HEIGHTS["circle"])
-    turn = np.linspace(0.0, 2.0 * np.pi, 181)
-    ax.fill(np.cos(turn), np.sin(turn), color=on_page(STICK), linewidth=0, zorder=0)
-    ax.plot(np.cos(turn), np.sin(turn), color=rcParams["axes.edgecolor"], linewidth=0.8, zorder=1)
+    ax = look.axes_or_current(ax, _HEIGHTS["circle"])
+    turn, frame = np.linspace(0.0, 2.0 * np.pi, 181), rcParams["axes.edgecolor"]
+    ax.fill(np.cos(turn), np.sin(turn), color=look.on_page(look.STICK), linewidth=0, zorder=0)
+    ax.plot(np.cos(turn), np.sin(turn), color=frame, linewidth=0.8, zorder=1)
     for centred in (ax.axhline, ax.axvline):
-        centred(0.0, color=rcParams["axes.edgecolor"], linewidth=0.4, zorder=1)
-    handles: list[Artist] = []
+        centred(0.0, color=frame, linewidth=0.4, zorder=1)
+    norm = (LogNorm if axis.scale == "log" else Normalize)(axis.edges[0], axis.edges[-1])
     reach = 1.1
-    edges = axis.edges
-    colours: dict[str, Any] = {"c": axis.values, "cmap": "viridis"}
-    colours["norm"] = (LogNorm if axis.scale == "log" else Normalize)(edges[0], edges[-1])
-    for k, (way, branch) in enumerate(_branches(ds)):
-        for name in ("1", "2"):
-            if f"multiplier_angle_{name}" not in branch:
-                continue
-            size, angle = (axis.along(branch[f"{kind}_{name}"]) for kind in ("multiplier", "multiplier_angle"))
-            known = np.isfinite(size) & np.isfinite(angle)
-            reach = max(reach, 1.1 * size[known].max(initial=0.0))
-            x_part, y_part = size * np.cos(angle), size * np.sin(angle)
-            drawn = ax.scatter(
-                x_part, y_part, s=10.0, marker="o^"[k], linewidths=0, rasterized=True, zorder=2 + k, **colours
-            )
-        if way:
-            handles.append(_dot("o^"[k], rcParams["text.color"], way))
+    for k, (_, branch) in enumerate(_branches(ds)):
+        for angle in (name for name in ("multiplier_angle_1", "multiplier_angle_2") if name in branch):
+            value = axis.along(branch[angle.replace("_angle", "")]) * np.exp(1j * axis.along(branch[angle]))
+            reach = max(reach, 1.1 * np.abs(value[np.isfinite(value)]).max(initial=0.0))
+            colours = {"c": axis.values, "cmap": "viridis", "norm": norm}
+            drawn = _scatter(ax, value.real, value.imag, s=10.0, marker="o^"[k], zorder=2 + k, **colours)
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    label_axes(ax, "real part of the multipliers", "imaginary part")
-    bar = ax.figure.colorbar(drawn, ax=ax, label=axis.label)
+    look.label_axes(ax, "real part of the multipliers", "imaginary part")
+    bar = look.colour_bar(drawn, [ax], axis.label)
     if axis.names:
         bar.set_ticks(range(len(axis.names)), labels=axis.names)
-    small_ticks(bar.ax)
-    legend_above(ax, handles)
+    look.legend_above(ax, _directions(ds, "o^"))
     return ax
 
 
-def _dot(marker: str, colour: Any, label: str) -> Line2D:
+def _scatter(ax: Axes, x: NDArray[Any], y: NDArray[Any], **style: Any) -> Any:
+    """Draw points, which are a picture in vector formats: there may be very many."""
+    return ax.scatter(x, y, linewidths=0, rasterized=True, **style)
+
+
+def _dot(marker: str, label: str, colour: Any = None) -> Line2D:
     """Entry of a legend for points."""
+    colour = rcParams["text.color"] if colour is None else colour
     return Line2D([], [], linestyle="", marker=marker, markersize=4, color=colour, label=label)
+
+
+def _directions(ds: xr.Dataset, markers: str = "") -> list[Artist]:
+    """Entries of a legend for the directions, which differ by their colours, or by these markers."""
+    ways = [way for way, _ in _branches(ds) if way]
+    return [_dot(markers[k], way) if markers else _dot("o", way, look.pair(k)) for k, way in enumerate(ways)]
 
 
 def _label(ds: xr.Dataset, name: str) -> str:
@@ -452,4 +432,4 @@ def _finish(ax: Axes, axis: Axis, label: str) -> None:
     axis.apply(ax.set_xscale, ax.xaxis)
     edges = axis.edges
     ax.set_xlim(edges[0], edges[-1])
-    label_axes(ax, axis.label, label)
+    look.label_axes(ax, axis.label, label)

@@ -182,6 +182,11 @@ def on_page(colour: Any) -> Any:
     return tuple(map(float, mixed))
 
 
+def pair(k: int) -> Any:
+    """Colour on the page of the first (0) or the second (1) of two: body and ring, or the contacts."""
+    return on_page(PAIR_COLOURS[k])
+
+
 def page_colour() -> Any:
     """Colour of the page; of a transparent one, the colour on which its text can be read."""
     for key in ("axes.facecolor", "figure.facecolor"):
@@ -354,6 +359,19 @@ def legend_above(ax: Axes, handles: list[Artist] | None = None) -> None:
         columns = math.ceil(len(handles) / lines)
         style = LEGEND | {"columnspacing": 1.2, "borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8}
         ax.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, **style)
+
+
+def band(ax: Axes, x: NDArray[Any], low: NDArray[Any], high: NDArray[Any], colour: Any, **style: Any) -> None:
+    """Draw the band of an interval around a curve."""
+    ax.fill_between(x, low, high, color=colour, alpha=0.3, linewidth=0, **style)
+
+
+def colour_bar(drawn: Any, panels: list[Axes], label: str, ticks: Any = None) -> Any:
+    """Draw one colour bar beside panels."""
+    figure: Any = panels[0].figure
+    bar = figure.colorbar(drawn, ax=panels, label=label, ticks=ticks)
+    small_ticks(bar.ax)
+    return bar
 
 
 def small_ticks(*axes: Axes) -> None:
