@@ -182,9 +182,8 @@ def read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: st
         raise InputError(where, f"{first:g} and {last:g} are too far apart: the values between them overflow")
     if parameter.whole:
         for value in values[values % 1.0 != 0.0][:1]:
-            raise InputError(
-                where, f"makes {value:g}, but {parameter.long_name} must be a whole number: list the values"
-            )
+            problem = f"makes {value:g}, but {parameter.long_name} must be a whole number: list the values"
+            raise InputError(where, problem)
     return values
 
 
@@ -216,10 +215,8 @@ def build_axes(columns: Iterable[Column]) -> Axes:
     for path, (dims, _) in found.columns.items():
         name = dimension(path)
         if name in found.sizes and dims != (name,):
-            raise InputError(
-                path,
-                f"the dimension {name} has the name of this path, but the path has other dimensions: rename it",
-            )
+            problem = f"the dimension {name} has the name of this path, but the path has other dimensions: rename it"
+            raise InputError(path, problem)
     return found
 
 

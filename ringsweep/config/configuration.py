@@ -229,14 +229,14 @@ def _validate(doc: Document) -> Config:
             raise InputError(key, "unknown section" + hint)
     sweep = sweep_section(doc)
     swept = swept_paths(sweep)
-    laws = [(f"sweep.{kind}.{LAW}", columns[LAW]) for kind, columns in sweep.items() if LAW in columns]
+    laws = next(((f"sweep.{kind}.{LAW}", columns[LAW]) for kind, columns in sweep.items() if LAW in columns), None)
     if (file := run_to_continue(doc)) is not None:
         try:
             before = load(file)
         except InputError as error:
             raise InputError("scene.initial.from", f"{file}: {error.problem}") from None
-        put_state(doc, parse_scene(doc, swept, laws[0] if laws else None), file, before.scene, before.axes, swept)
-    scene = parse_scene(doc, swept, laws[0] if laws else None)
+        put_state(doc, parse_scene(doc, swept, laws), file, before.scene, before.axes, swept)
+    scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = sweep_axes(scene, sweep)
     if doc.result_axes is None and doc.locations:
@@ -260,13 +260,11 @@ def _checked(config: Config) -> Config:
     """A configuration, unless two parts of its sweep, or a part and a section, exclude each other."""
     if config.refine is not None and config.sample is not None:
         raise InputError("sweep.refine", _NOT_REFINED)
-    for key, given, lack in (
-        ("refine", config.refine, "cells that are inferred have no points"),
-        ("sample", config.sample, "a probability has no points"),
-    ):
-        if given is not None and config.scene.structure.section is not None:
-            raise InputError(f"sweep.{key}", _NO_SECTION.format(lack))
-        if given is not None and config.follow is not None:
+    lacks = {"refine": "cells that are inferred have no points", "sample": "a probability has no points"}
+    for key in [key for key in lacks if getattr(config, key) is not None]:
+        if config.scene.structure.section is not None:
+            raise InputError(f"sweep.{key}", _NO_SECTION.format(lacks[key]))
+        if config.follow is not None:
             raise InputError(f"sweep.{key}", _NOT_FOLLOWED)
     return config
 
@@ -336,11 +334,9 @@ def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parame
 
 def as_written(config: Config, path: str) -> Any:
     """A number as a configuration gives it, with its unit: in the scene, or else first on its axis; or None."""
-    node = written(config.source, path)
-    if node is None:
-        sweep = config.source.get("sweep", {})
-        for columns in (sweep.get("grid", {}), sweep.get("points", {})):
-            node = columns.get(path, node)
+    node, sweep = written(config.source, path), config.source.get("sweep", {})
+    for columns in (sweep.get("grid", {}), sweep.get("points", {})):
+        node = columns.get(path) if node is None else node
     while node and isinstance(node, dict | list):
         node = next(iter(node.values())) if isinstance(node, dict) else node[0]
     return node
@@ -357,15 +353,11 @@ def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
             node[key] = {}
             doc.locations[".".join(parents[:depth])] = told
         node = _child(node, key, full)
-    before = None
-    if isinstance(node, list):
-        before = _child(node, last, full)
-        node[int(last)] = value
-    elif isinstance(node, dict):
-        before = node.get(last)
-        node[last] = value
-    else:
+    if not isinstance(node, dict | list):
         raise InputError(full, f"cannot be set: {'.'.join(parents)} is {show(node)}")
+    before = node.get(last) if isinstance(node, dict) else _child(node, last, full)
+    place: Any = last if isinstance(node, dict) else int(last)
+    node[place] = value
     doc.locations[full] = told
     return full, before
 

@@ -83,39 +83,31 @@ def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
     columns = {path: values for path, (_, values) in axes.columns.items() if values.dtype.kind == "f"}
     for path, (dims, _) in axes.columns.items():
         if dims != (dimension(path),):
-            raise InputError(
-                "sweep.refine",
-                f"{path} varies along {' x '.join(dims)}, but only a grid can be refined: a point has no neighbours",
-            )
+            problem = f"varies along {' x '.join(dims)}, but only a grid can be refined: a point has no neighbours"
+            raise InputError("sweep.refine", f"{path} {problem}")
     names = {path: values for path, values in columns.items() if len(values) > 1}
     if not names:
         raise InputError("sweep.refine", "the sweep has no grid axis of two or more numbers: nothing can be refined")
-    if given is None:
-        chosen = sorted(names, key=lambda path: -len(names[path]))[:2]
-    else:
-        if not isinstance(given, list) or not 1 <= len(given) <= 2 or len(set(map(str, given))) != len(given):
-            raise InputError("sweep.refine.axes", f"one or two paths of sweep.grid are expected, got {show(given)}")
-        chosen = given
-        for k, path in enumerate(chosen):
-            problem = "is an axis of one value" if path in columns else "is no axis of numbers"
-            one_of(path, names, f"sweep.refine.axes.{k}", problem)
-    for path in chosen:
+    chosen = sorted(names, key=lambda path: -len(names[path]))[:2] if given is None else given
+    if not isinstance(chosen, list) or not 1 <= len(chosen) <= 2 or len(set(map(str, chosen))) != len(chosen):
+        raise InputError("sweep.refine.axes", f"one or two paths of sweep.grid are expected, got {show(given)}")
+    for k, path in enumerate(chosen):
+        problem = "is an axis of one value" if path in columns else "is no axis of numbers"
+        one_of(path, names, f"sweep.refine.axes.{k}", problem)
         steps = np.diff(names[path])
         if not ((steps > 0).all() or (steps < 0).all()):
-            raise InputError(
-                f"sweep.grid.{path}", "values go up and down: along an axis that is refined they must ascend or descend"
-            )
+            problem = "values go up and down: along an axis that is refined they must ascend or descend"
+            raise InputError(f"sweep.grid.{path}", problem)
     # In the order of the grid.
     return tuple(dimension(path) for path in names if path in chosen)
 
 
 def _also(section: dict[str, Any], scene: Scene) -> tuple[str | None, float | None]:
     """The variable that is interpolated, and its largest error."""
-    if ("also" in section) != ("within" in section):
-        there, lacks = ("also", "within") if "also" in section else ("within", "also")
-        raise InputError(
-            f"sweep.refine.{lacks}", f"missing: `{there}` needs it, for example `also: t_separation, within: 1e-3`"
-        )
+    for there, lacks in (("also", "within"), ("within", "also")):
+        if there in section and lacks not in section:
+            problem = f"missing: `{there}` needs it, for example `also: t_separation, within: 1e-3`"
+            raise InputError(f"sweep.refine.{lacks}", problem)
     if "also" not in section:
         return None, None
     also = one_of(section["also"], outcome_numbers(scene), "sweep.refine.also", "is no number of this model")

@@ -208,12 +208,11 @@ def _warn_of_unused_numbers(structures: Mapping[str, Structure], leaves: Collect
     used = {*numbers_of(structures), *_structural(first.model, first.drive, structures)}
     for path in leaves:
         if path not in used:
-            if path.startswith("force."):
-                raise InputError(
-                    f"scene.{path}", "cannot stand beside a table or a formula, which gives all of the force"
-                )
-            is_drive = path.startswith("drive.")
-            law = f"drive law {first.drive}" if is_drive else f"friction law {' or '.join(structures)}"
+            section = path.partition(".")[0]
+            if section == "force":
+                problem = "cannot stand beside a table or a formula, which gives all of the force"
+                raise InputError(f"scene.{path}", problem)
+            law = f"drive law {first.drive}" if section == "drive" else f"friction law {' or '.join(structures)}"
             warn_once("scene.%s is not used: %s has no such parameter%s", path, law, laws_with(path))
 
 
@@ -222,10 +221,8 @@ def _warn_of_lengths(lengths: Mapping[str, float]) -> None:
     given = sorted((abs(value), path) for path, value in lengths.items() if value)
     if given and given[-1][0] > _LARGEST_RATIO * given[0][0]:
         (short, small), (long, large) = given[0], given[-1]
-        warn_once(
-            "scene.%s is %g m and scene.%s is %g m: is a unit missing? A plain number is in metres",
-            *(large, long, small, short),
-        )
+        message = "scene.%s is %g m and scene.%s is %g m: is a unit missing? A plain number is in metres"
+        warn_once(message, large, long, small, short)
 
 
 def warn_of_plain_angle(path: str, given: Any, parameter: Parameter | Choice) -> None:
@@ -233,11 +230,8 @@ def warn_of_plain_angle(path: str, given: Any, parameter: Parameter | Choice) ->
     # Other than angles without limits are refused if they are this large.
     is_angle = isinstance(parameter, Parameter) and parameter.unit == "rad" and is_plain(given)
     if is_angle and abs(angle := float(given)) > _LARGEST_ANGLE:
-        warn_once(
-            "scene.%s is %g rad, %.3g turns: is a unit missing? A plain number is in radians; write `%g deg` for "
-            "degrees",
-            *(path, angle, abs(angle) / (2.0 * pi), angle),
-        )
+        message = "scene.%s is %g rad, %.3g turns: is a unit missing? A plain number is in radians; write `%g deg` for "
+        warn_once(message + "degrees", path, angle, abs(angle) / (2.0 * pi), angle)
 
 
 def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:

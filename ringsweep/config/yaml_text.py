@@ -120,16 +120,14 @@ class Document:
                 columns[name] = unit, []
             if not columns:
                 raise wrong("the file is empty")
-            count = 0
             for row in rows:
                 if not any(cell.strip() for cell in row):
                     continue
                 if len(row) != len(columns):
                     raise wrong(f"{len(row)} values under {len(columns)} columns")
                 for (column, (unit, cells)), cell in zip(columns.items(), row, strict=True):
+                    self.locations[f"{section}.{column}.{len(cells)}"] = str(file), rows.line_num
                     cells.append(scalar(f"{cell.strip()} {unit}".strip()))
-                    self.locations[f"{section}.{column}.{count}"] = str(file), rows.line_num
-                count += 1
         except csv.Error as error:
             raise wrong(f"not a CSV file: {error}") from None
         for column in columns:
