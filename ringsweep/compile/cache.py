@@ -92,10 +92,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     """
     dispatcher = numba.njit(**KERNEL_OPTIONS, **KERNEL_COMPILER)(function)
     dispatcher.compile = _without_collection(dispatcher.compile)
-    # Without the suffix, kernels with own files and kernels without them would replace each other in the cache.
-    keep_on_disk(
-        dispatcher, _KERNELS_DIGEST, _KERNELS_DIGEST[:12] if OWN_FILES else "", _announce_compilation, _announce_damage
-    )
+    keep_on_disk(dispatcher, _KERNELS_DIGEST, _announce_compilation)
     return dispatcher
 
 
@@ -118,8 +115,3 @@ def _without_collection(compiled: Callable[..., Any]) -> Callable[..., Any]:
 @cache
 def _announce_compilation() -> None:
     logger.info("compiling for a new kind of scene: this takes 5 to 15 seconds, once")
-
-
-@cache
-def _announce_damage(folder: str) -> None:
-    logger.warning("compiled code in %s is damaged: compiling it again", folder)

@@ -14,9 +14,11 @@ import logging
 import operator
 import pickle
 from collections.abc import Callable
+from contextlib import suppress
 from copy import copy
 from functools import cache, cached_property
 from pathlib import Path
+from time import time
 from types import CodeType
 from typing import Any, ClassVar
 
@@ -336,64 +338,43 @@ if AVAILABLE:
 
     # ---- compiled code on disk --------------------------------------------------------------------
 
-    class _DamagedFile(Exception):
-        """A file of the cache that is not what was written."""
+    class _NamedFiles(IndexDataCacheFile):
+        """One file for each compiled kernel, whose name is a digest of all that determines the code.
 
-    class _SealedFiles(IndexDataCacheFile):
-        """Files of the cache, each with a digest in front, which also covers the sources and the version of Numba.
-
-        A file of compiled code also holds the name of its kernel, the signature and the processor: a file that was
-        copied over another is whole, but it is not what is looked for.
+        These are the sources, the version of Numba, and Numba's key: function, types of the arguments, processor and
+        its features. A file begins with a digest of its content, and holds the key too: two types can have one name.
         """
 
+        def _path(self, key: Any) -> Path:
+            name = hashlib.sha256(repr((self._version, self._index_name, key)).encode()).hexdigest()
+            return Path(self._cache_path, f"{self._index_name.partition('-')[0]}-{self._source_stamp}-{name[:32]}.nbc")
+
         def save(self, key: Any, data: Any) -> None:
-            super().save(key, (self._identity(key), self._dump(data)))
+            body = self._dump((self._index_name, key, data))
+            with self._open_for_write(self._path(key)) as file:
+                file.write(hashlib.sha256(body).digest() + body)
+            for old in Path(self._cache_path).glob("*.nb[ci]"):
+                # Of other sources; another process may remove it at the same time.
+                with suppress(OSError):
+                    if f"-{self._source_stamp}-" not in old.name and time() - old.stat().st_mtime > _KEPT:
+                        old.unlink()
 
         def load(self, key: Any) -> Any:
-            found = super().load(key)
-            if found is None:
-                return None
-            identity, body = found
-            if identity != self._identity(key):
-                raise _DamagedFile(Path(self._index_path).parent)
-            return pickle.loads(body)
-
-        def _identity(self, key: Any) -> str:
-            return repr((self._index_name, key))
-
-        def _seal(self, body: bytes) -> bytes:
-            return hashlib.sha256(repr((self._version, self._source_stamp)).encode() + body).digest()
-
-        def _save(self, path: str, content: Any) -> None:
-            body = self._dump(content)
-            with self._open_for_write(path) as file:
-                file.write(self._seal(body) + body)
-
-        def _load(self, path: str) -> Any:
-            content = Path(path).read_bytes()
-            seal, body = content[:_DIGEST], content[_DIGEST:]
-            if seal != self._seal(body):
-                raise _DamagedFile(Path(path).parent)
-            return pickle.loads(body)
-
-        def _save_index(self, overloads: Any) -> None:
-            self._save(self._index_path, overloads)
-
-        def _load_index(self) -> Any:
-            # An index that does not fit is most often one of earlier sources. One that cannot be read may belong to
-            # another user, and one that cannot be unpickled may name types that this process does not have.
             try:
-                return self._load(self._index_path)
-            except (OSError, _DamagedFile, AttributeError, ImportError):
-                return {}
-
-        def _save_data(self, name: str, data: Any) -> None:
-            self._save(self._data_path(name), data)
-
-        def _load_data(self, name: str) -> Any:
-            return self._load(self._data_path(name))
+                content = self._path(key).read_bytes()
+                body = content[_DIGEST:]
+                if hashlib.sha256(body).digest() != content[:_DIGEST]:
+                    return None
+                *found, data = pickle.loads(body)
+            except (OSError, AttributeError, ImportError):
+                # It is not there, belongs to another user, or names types that this process does not have.
+                return None
+            return data if found == [self._index_name, key] else None
 
     _DIGEST = hashlib.sha256().digest_size
+
+    # Seconds for which compiled code of other sources is kept.
+    _KEPT = 86_400.0
 
     #: Further options of kernels, and of functions that are compiled into kernels.
     KERNEL_COMPILER: dict[str, Any] = {"pipeline_class": _KernelCompiler}
@@ -428,14 +409,11 @@ else:
         overload(function, jit_options=options, strict=False)(typed)
 
 
-def keep_on_disk(
-    dispatcher: Any, digest: str, suffix: str, announce: Callable[[], None], damaged: Callable[[str], None]
-) -> None:
-    """Keep the compiled code of a function on disk, under a key that covers the sources of all functions it calls.
+def keep_on_disk(dispatcher: Any, digest: str, announce: Callable[[], None]) -> None:
+    """Keep the compiled code of a function on disk, under a name that covers the sources of all functions it calls.
 
-    Numba itself notices an edit only in the file of the function, and trusts what the files of its cache hold. Here
-    each file is read only if it is whole. Without Numba's private interfaces, or if no folder for the cache is
-    writable, each process compiles the function anew.
+    Numba itself notices an edit only in the file of the function, and trusts what the files of its cache hold. Without
+    Numba's private interfaces, or if no folder for the cache is writable, each process compiles the function anew.
 
     Parameters
     ----------
@@ -443,35 +421,23 @@ def keep_on_disk(
         The result of ``numba.njit``.
     digest : str
         Digest of the sources.
-    suffix : str
-        Added to the name of the cache's index. Functions with different suffixes do not replace each other.
     announce : callable
         Called before each compilation.
-    damaged : callable
-        Called in place of it with the name of a folder, if there is a damaged file in it.
     """
     if not AVAILABLE:
         return
+    problem = ""
     try:
         dispatcher.enable_caching()
         kept = dispatcher._cache
-        old = kept._cache_file
-        name = old._index_name.removesuffix(".nbi") + (f"-{suffix}" if suffix else "")
-        kept._cache_file = _SealedFiles(kept._cache_path, name, (old._source_stamp, digest))
-        problem = ""
-    except (RuntimeError, AttributeError) as error:
+        kept._cache_file = _NamedFiles(kept._cache_path, kept._cache_file._index_name, digest[:16])
+    except RuntimeError:
         kept = dispatcher._cache = NullCache()
         problem = "no folder for it is writable: NUMBA_CACHE_DIR can name one"
-        if isinstance(error, AttributeError):
-            problem = "this version of Numba has another cache"
     load_overload, save_overload = kept.load_overload, kept.save_overload
 
     def load_or_announce(*arguments: Any) -> Any:
-        try:
-            found = load_overload(*arguments)
-        except _DamagedFile as error:
-            damaged(str(error))
-            return None
+        found = load_overload(*arguments)
         if found is None:
             announce()
             if problem:
