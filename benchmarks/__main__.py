@@ -2,7 +2,7 @@
 
     python -m benchmarks                        # all: an hour on two cores
     python -m benchmarks --quick                # less of everything, one benchmark on each core: times mean little
-    python -m benchmarks --only speed scaling   # these
+    python -m benchmarks --only speed sizes     # these
     python -m benchmarks --keep                 # replace the results that the documents show
 
 Reports are written to `benchmark-results/`. A report that is there already, of the same sources, is not measured again,
@@ -27,14 +27,11 @@ COMMANDS = (
     "speed",
     "work_precision",
     "stability",
-    "certificates",
     "errors",
     "first_page",
     "scenes",
-    "scaling",
     "sizes",
     "refine",
-    "fits",
     "probabilities",
     "diagram",
     "long_runs",

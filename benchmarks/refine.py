@@ -1,7 +1,7 @@
 """Refined maps against full ones: cost, wrong cells, the bound of the audit; cost against resolution; PhaseMap.
 
     python -m benchmarks.refine                # ten minutes: full maps of 512 and 1024 cells a side
-    python -m benchmarks.refine --part scaling # or full, zoom
+    python -m benchmarks.refine --part scaling # or full
     python -m benchmarks.refine --quick        # smaller maps
 
 The scene is the map of the README. A full and a refined map are computed one after the other in one run. CPU seconds
@@ -27,8 +27,6 @@ from ringsweep.runs.refined import SEED
 from ringsweep.runs.refinement import Answer, refine
 
 SCENE = ring({"law": "bengisu-akay", "alpha": ALPHA, "v0": V0})
-#: A ragged place in the lower right corner of the map: amplitude (rad/s), half-angle (rad).
-CORNER = (3.6, np.radians(3.2))
 
 
 def grid(side: int) -> dict[str, Any]:
@@ -144,67 +142,20 @@ def scaling(sides: list[int], folder: str, picture: Path) -> str:
     )
 
 
-def densest(labels: Any, side: int) -> tuple[int, int]:
-    """A cell beside a boundary, in the middle of that square in which most cells lie beside one."""
-    edges = np.zeros(labels.shape, dtype=int)
-    edges[1:] |= labels[1:] != labels[:-1]
-    edges[:, 1:] |= labels[:, 1:] != labels[:, :-1]
-    sums = np.pad(edges, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
-    squares = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
-    middle = np.array(np.unravel_index(squares.argmax(), squares.shape)) + side // 2
-    cells = np.argwhere(edges)
-    row, column = cells[np.argmin(((cells - middle) ** 2).sum(axis=1))]
-    return int(row), int(column)
-
-
-def zoom(side: int) -> str:
-    """Uncertainty exponent of ever smaller windows in the lower right corner, each where boundaries are densest."""
-    rows = []
-    place = list(CORNER)
-    for decade in range(4):
-        half = 0.3 * 10.0**-decade
-        axes = {
-            "drive.amplitude": (place[0] * np.exp(np.linspace(-half, half, side))).tolist(),
-            "zone.half_angle": (place[1] * np.exp(np.linspace(-half, half, side))).tolist(),
-        }
-        ds = ringsweep.sweep(SCENE, axes, progress=False)
-        found = ringsweep.uncertainty_exponent(ds)
-        counts = ", ".join(f"{e}: {c}" for e, c in zip(found.epsilon.values, found.uncertain.values, strict=True))
-        rows.append([f"{2 * half:.0e}", counts, f"{float(found.exponent):.2f} ± {float(found.exponent_error):.2f}",
-                     f"{100 * float((ds.certified == 1).mean()):.1f} %",
-                     f"{float(ds.reversals.median()):.0f}, {float(ds.reversals.max()):.0f}"])  # fmt: skip
-        print(*rows[-1], flush=True)
-        row, column = densest(labels_of(ds), side // 10)
-        place = [axes["drive.amplitude"][row], axes["zone.half_angle"][column]]
-    header = [
-        "relative width",
-        "boxes of each side with two labels",
-        "exponent",
-        "certified",
-        "reversals: median, most",
-    ]
-    heading("Zoom")
-    table(header, rows)
-    return "## Zoom into the lower right corner\n\n" + markdown(header, rows)
-
-
 def main() -> None:
     """Measure, print, write."""
     parser = command(__doc__)
-    parser.add_argument("--part", choices=["full", "scaling", "zoom"], help="only this part, which is only printed")
+    parser.add_argument("--part", choices=["full", "scaling"], help="only this part, which is only printed")
     parser.add_argument("--sides", type=int, nargs="+", help="cells along a side of the maps of this part")
     given = parser.parse_args()
     where = machine(["phasemap"])
     print(where)
     ringsweep.sweep(SCENE, grid(2), progress=False)
-    full, resolutions, window = (
-        ([128], [64, 128], 64) if given.quick else ([512, 1024], [2**k for k in range(6, 12)], 128)
-    )
+    full, resolutions = ([128], [64, 128]) if given.quick else ([512, 1024], [2**k for k in range(6, 12)])
     with tempfile.TemporaryDirectory() as folder:
         parts = {
             "full": lambda: against_full(given.sides or full, folder),
             "scaling": lambda: scaling(given.sides or resolutions, folder, folder_of(given) / "refine.png"),
-            "zoom": lambda: zoom((given.sides or [window])[0]),
         }
         texts = [part() for name, part in parts.items() if given.part in (None, name)]
     if given.part is None:

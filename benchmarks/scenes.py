@@ -5,8 +5,7 @@
 
 Each row is measured under `rk4`, and under `event` or `implicit`, whichever handles its law, on one core, compiled
 before, without certificates. All rows run in turn within each round. A ratio is the median of the ratios within the
-rounds. *Idle* pairs compute the same motion twice: with a thing that has no effect (a drive of amplitude 0, a zone as
-rough as the rest), and without it. Compilation is measured in CPU seconds, which do not grow with other load on the
+rounds. Compilation is measured in CPU seconds, which do not grow with other load on the
 machine, in a new process for each kernel.
 
 Writes `scenes.md`.
@@ -17,11 +16,9 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import subprocess
 import sys
 import tempfile
-import termios
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import radians
@@ -47,8 +44,6 @@ from benchmarks._common import (
     table,
 )
 from ringsweep.physics.friction import LAWS, SetValued, coefficients_of, family_of
-from ringsweep.runs import sweep
-from ringsweep.runs.executors import Execution
 from ringsweep.solvers import automaton, rk4
 
 ROOT = Path(__file__).parent.parent
@@ -169,42 +164,6 @@ LADDER: dict[str, Rung] = {
     "belt + bristles (lugre)": Rung(on_belt("lugre"), "belt + stiction", *_BELT),
 }
 
-_ALL_ALIKE = {"mu_s": 0.1, "mu_k": 0.1}
-
-
-def _level(law: str) -> dict[str, Any]:
-    """Scene of a ring under a law with mu_s = mu_k."""
-    scene = on_ring(law, drive=_ARCTAN)
-    scene["friction"]["rest"] = _ALL_ALIKE if law != "coulomb" else {"mu_k": 0.1}
-    scene["zones"] = on_ring(drive=_ARCTAN, arcs=3, rough={"mu_k": 0.1})["zones"]
-    if law != "coulomb":
-        scene["zones"] = [zone | _ALL_ALIKE for zone in scene["zones"]]
-    return scene
-
-
-#: Scenes with a thing that has no effect, each with the scene that gives the same motion without it.
-IDLE: dict[str, tuple[Rung, Rung]] = {
-    "constant drive of amplitude 0": (
-        Rung(on_ring(drive=_CONSTANT | {"amplitude": 0.0}), None),
-        LADDER["+ second contact"],
-    ),
-    "arctan drive of amplitude 0": (
-        Rung(on_ring(drive=_ARCTAN | {"amplitude": 0.0}), None),
-        LADDER["+ second contact"],
-    ),
-    "a zone like the rest": (
-        Rung(on_ring(drive=_ARCTAN, arcs=1, rough=_REST), None),
-        LADDER["+ arctan drive in its place"],
-    ),
-    "three zones like the rest": (
-        Rung(on_ring(drive=_ARCTAN, arcs=3, rough=_REST), None),
-        LADDER["+ arctan drive in its place"],
-    ),
-    "stiction with μs = μk": (Rung(_level("stiction"), None), Rung(_level("coulomb"), None)),
-    "tustin with μs = μk": (Rung(_level("tustin"), None), Rung(_level("stiction"), None)),
-}
-
-
 # ---- measurements in a new process; each returns what JSON can hold ------------------------
 
 
@@ -257,14 +216,12 @@ def code_of(assembly: str) -> dict[str, Any]:
 
 def step_times(cells: int, few: int, rounds: int) -> dict[str, Any]:
     """Seconds of every scene under both methods in each round, and numbers of steps and runs."""
-    rungs = LADDER | {f"idle: {name}": pair[0] for name, pair in IDLE.items()}
-    rungs |= {f"without: {name}": pair[1] for name, pair in IDLE.items()}
     found: dict[str, Any] = {}
     with one_core():
         for own in (False, True):
             calls = {
                 name: bare(rung.configuration(rung.piecewise if own else "rk4", few if own else cells))
-                for name, rung in rungs.items()
+                for name, rung in LADDER.items()
                 if METHODS[own] in rung.methods
             }
             for call in calls.values():
@@ -277,31 +234,6 @@ def step_times(cells: int, few: int, rounds: int) -> dict[str, Any]:
                     "runs": len(results[name].steps),
                 }
     return found
-
-
-def diagnostics(cells: int, rounds: int) -> float:
-    """Time of the fullest ring under `rk4` over the time with `diagnose: false`."""
-    rung = LADDER["+ stiction band (bengisu-akay)"]
-    calls = {keep: bare(rung.configuration("rk4", cells, diagnose=keep)) for keep in (True, False)}
-    for call in calls.values():
-        call()
-    with one_core():
-        times, _ = alternate(calls, rounds)
-    return times[True].ratio(times[False])
-
-
-def memory(cells: int) -> dict[str, float]:
-    """Peak resident memory, MiB: after the import, after a small sweep, and after a sweep of `cells` cells."""
-    rung = LADDER["one contact, Coulomb, immobile uniform ring"]
-
-    def peak() -> float:
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-
-    found = {"imported": peak()}
-    sweep.compute(rung.configuration("rk4", 64, steps=10), Execution(progress=False))
-    found["small"] = peak()
-    sweep.compute(rung.configuration("rk4", cells, steps=10), Execution(progress=False))
-    return found | {"large": peak()}
 
 
 # ---- processes -----------------------------------------------------------------------------
@@ -323,40 +255,6 @@ def environment(cache: Path) -> dict[str, str]:
 def size_of(folder: Path) -> int:
     """Bytes of the files in a folder."""
     return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-
-
-def best_of(command: Sequence[str], rounds: int, cache: Path) -> float:
-    """Least time that a command takes, s."""
-    walls = []
-    for _ in range(rounds):
-        begin = time.perf_counter()
-        subprocess.run(command, env=environment(cache), stdout=subprocess.DEVNULL, check=True)
-        walls.append(time.perf_counter() - begin)
-    return min(walls)
-
-
-def first_and_last(config: Path, folder: Path, cache: Path) -> tuple[float, float]:
-    """Seconds until the progress bar of `ringsweep run` first moves, and until the command is done."""
-    # The progress bar appears only in a terminal.
-    bar, terminal = os.openpty()
-    termios.tcsetwinsize(terminal, (24, 80))
-    command = [sys.executable, "-m", "ringsweep", "run", str(config), "--fresh", "-o", str(folder / "map.nc")]
-    begin = time.perf_counter()
-    with subprocess.Popen(command, env=environment(cache), stdout=subprocess.DEVNULL, stderr=terminal) as process:
-        os.close(terminal)
-        said, first = b"", 0.0
-        while True:
-            try:
-                said += os.read(bar, 4096)
-            except OSError:
-                # On Linux this error means that no process writes to the terminal any more.
-                break
-            if not first and re.search(rb"[1-9]\d*/\d+ \[", said):
-                first = time.perf_counter() - begin
-    os.close(bar)
-    if process.returncode:
-        raise RuntimeError(said.decode())
-    return first, time.perf_counter() - begin
 
 
 # ---- the command ---------------------------------------------------------------------------
@@ -423,40 +321,9 @@ def main() -> None:
 
         found = in_child(step_times, cells, few, rounds, cache=shared)
         sections.append(("From the simplest scene to the fullest", HEADER, ladder(found, compiled)))
-        idle = [[thing, *(f"{over(found, f'idle: {thing}', f'without: {thing}', method):.2f}" for method in METHODS)]
-                for thing in IDLE]  # fmt: skip
         parts = [[name, method, *(str(one["optional"][thing]) for thing in OPTIONAL)]
                  for (name, method), one in compiled.items() if one["optional"]]  # fmt: skip
         sections.append((LEFT_OUT, ["scene", "method", *OPTIONAL], parts))
-        sections.append(("Things without effect: time with the thing over time without it", ["", "rk4", "event"], idle))
-        kept = in_child(diagnostics, cells, rounds, cache=shared)
-
-        python = [sys.executable, "-c"]
-        bare_start = best_of([*python, "pass"], rounds, shared)
-        imported = best_of([*python, "import ringsweep"], rounds, shared)
-        everything = best_of([*python, "import ringsweep.runs.sweep"], rounds, shared)
-        helped = best_of([sys.executable, "-m", "ringsweep", "--help"], rounds, shared)
-        many = 100_000
-        peaks = in_child(memory, many, cache=shared)
-        config, cache = ROOT / "configs" / "regime_map.yaml", folder / "cold"
-        cold = first_and_last(config, folder, cache)
-        print(f"cold: {cold[0]:.1f} s, {cold[1]:.1f} s", flush=True)
-        warm = min(first_and_last(config, folder, cache) for _ in range(3))
-        idle.append(["stiffness recorded, over `diagnose: false`", f"{kept:.2f}", "-"])
-        words = "`ringsweep run configs/regime_map.yaml`"
-        sections.append(("Start and memory", ["", ""], [
-            ["python alone", f"{bare_start:.2f} s"],
-            ["`import ringsweep`", f"{imported:.2f} s"],
-            ["`import ringsweep.runs.sweep`, with Numba and xarray", f"{everything:.2f} s"],
-            ["`ringsweep --help`", f"{helped:.2f} s"],
-            [f"{words}, cold: time to the first cells, total", f"{cold[0]:.1f} s, {cold[1]:.1f} s"],
-            [f"{words}, warm: time to the first cells, total", f"{warm[0]:.1f} s, {warm[1]:.1f} s"],
-            ["size of its cache", f"{size_of(cache) / 1024:.0f} KiB"],
-            ["peak memory after the import", f"{peaks['imported']:.0f} MiB"],
-            ["peak memory after a sweep of 64 cells", f"{peaks['small']:.0f} MiB"],
-            [f"additional memory for {many} cells", f"{peaks['large'] - peaks['small']:.0f} MiB"],
-        ]))  # fmt: skip
-
     report = ABOUT
     for title, header, rows in sections:
         heading(title)

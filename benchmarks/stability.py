@@ -13,9 +13,10 @@ Every run is put into one of four classes against a reference:
 - ``failed``: the solver gave up and said so.
 
 A cell of a map has the worst class of three scenes, so that no result depends on one lucky scene. The reference of
-the maps is the piecewise method at a tolerance five decades below its default. This reference is compared with
-Runge-Kutta at a step within its limit of stability, and with ``benchmarks.reference``, which shares no code with
-the package. Writes ``stability.nc``, ``stability.png`` and ``stability.md``.
+the maps is the piecewise method at a tolerance five decades below its default. ``benchmarks.brute_force`` compares
+this method with a reference that shares no code with the package.
+
+Writes ``stability.nc``, ``stability.png`` and ``stability.md``.
 """
 
 from __future__ import annotations
@@ -36,7 +37,6 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from benchmarks import reference
 from benchmarks._common import (
     ALPHA,
     BODY,
@@ -57,8 +57,6 @@ from ringsweep.runs import sweep
 from ringsweep.runs.executors import Execution
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage import netcdf
-
-SEED = 29
 
 #: Allowed error of phi_end (rad), of t_separation (s), and of x_end relative to the largest displacement.
 CLOSE = 1e-3
@@ -299,31 +297,6 @@ def draw_maps(quick: bool) -> tuple[xr.Dataset, list[Map]]:
                 long_name="largest |eigenvalue| times step")  # fmt: skip
         print(f"{map_.name}: {time.perf_counter() - begin:.1f} s", flush=True)
     return xr.Dataset(variables, coords), chosen
-
-
-def crosscheck(quick: bool) -> list[list[str]]:
-    """Compare the reference of the smooth maps with Runge-Kutta within its limit, and with brute force."""
-    rng = np.random.default_rng(SEED)
-    rows = []
-    for name, scene in SCENES.items():
-        # Bands that Runge-Kutta resolves in a reasonable number of steps, and one that only LSODA resolves.
-        bands = [*10.0 ** rng.uniform(-4.0, 0.0, 1 if quick else 3), 10.0 ** rng.uniform(-9.0, -7.0)]
-        for v0, alpha in zip(bands, 10.0 ** rng.uniform(0.0, 5.0, len(bands)), strict=True):
-            one = changed(scene, {"friction.v0": float(v0), "friction.alpha": float(alpha)})
-            ours = run(one, {"method": "implicit", "rtol": 1e-11})
-            theirs = reference.judge(one)
-            kind = (REGIMES[int(ours["regime"])], REGIMES[int(ours["motion"])], int(ours["separating_contact"]))
-            same = kind == theirs.kind
-            late = np.nan_to_num(abs(float(ours["t_separation"]) - theirs.numbers.get("t_separation", np.nan)))
-            stiff = float(run(one, {"method": "rk4", "steps": 15000, "certify": False})["stiffness"])
-            steps = int(max(1e5, 15000 * stiff / 1.0))
-            off = "-"
-            if steps <= 3e6:
-                fixed = run(one, {"method": "rk4", "steps": steps, "certify": False})
-                off = f"{abs(float(fixed['phi_end'] - ours['phi_end'])):.0e}"
-            rows.append([name, f"{v0:.2g}", f"{alpha:.2g}", "/".join(map(str, kind)), theirs.state,
-                         "yes" if same else "NO", f"{late:.0e}", off])  # fmt: skip
-    return rows
 
 
 # ---- extremes --------------------------------------------------------------------------------
@@ -585,60 +558,6 @@ def try_extremes() -> tuple[xr.Dataset, list[list[str]]]:
     return xr.Dataset(variables, coords), lines
 
 
-# ---- energy ----------------------------------------------------------------------------------
-
-
-def energy_drift(found: xr.Dataset, omega: float) -> Any:
-    """Relative change of the energy of a body launched from the bottom."""
-    weight = BODY["mass"] * GRAVITY * XI
-    end = 0.5 * ABOUT_AXIS * found["omega_end"] ** 2 + weight * (1.0 - np.cos(found["phi_end"]))
-    return np.asarray(end / (0.5 * ABOUT_AXIS * omega**2) - 1.0)
-
-
-def drifts(quick: bool) -> tuple[xr.Dataset, list[list[str]], float]:
-    """Drift of the energy without friction and drive, for spans up to 1e4 s, and the order of the drift of rk4."""
-    omega = 10.0
-    spans = np.array([1e1, 1e2, 1e3] if quick else [1e1, 1e2, 1e3, 1e4])
-    bare = {"friction.rough": {"mu_s": 0.0, "mu_k": 0.0}, "friction.rest": {"mu_s": 0.0, "mu_k": 0.0}}
-    smooth = changed(FIG_29, bare | {"drive.amplitude": 0.0, "initial.omega": omega})
-    methods: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
-    for rtol in (3e-6, 1e-8, 1e-10):
-        methods[f"implicit, rtol {rtol:g}"] = smooth, {"method": "implicit", "rtol": rtol}
-    for rtol in (1e-6, 1e-10, 1e-14):
-        methods[f"event, rtol {rtol:g}"] = with_law(smooth, "stiction"), {"method": "event", "rtol": rtol}
-    for per_second in (100, 200, 400, 800):
-        methods[f"rk4, step {1.0 / per_second:g} s"] = smooth, {"method": "rk4", "per_second": per_second}
-    drift, steps = np.empty((len(methods), len(spans))), np.empty((len(methods), len(spans)))
-    for i, (scene, solver) in enumerate(methods.values()):
-        for k, span in enumerate(spans):
-            options: dict[str, Any] = {"max_steps": 10_000_000}
-            if "per_second" in solver:
-                options = {"steps": int(span * solver["per_second"])}
-            options |= {name: value for name, value in solver.items() if name != "per_second"} | {"certify": False}
-            found = run(changed(scene, {"time.span": float(span)}), options)
-            drift[i, k], steps[i, k] = energy_drift(found, omega), found["steps"]
-    lines = [
-        [name, *(f"{drift[i, k]:.1e} ({steps[i, k]:.2g})" for k in range(len(spans)))] for i, name in enumerate(methods)
-    ]
-    # Over ten seconds the loss is so small that it is proportional to its rate.
-    first = [list(methods).index(f"rk4, step {1.0 / n:g} s") for n in (100, 200, 400)]
-    order = float(np.polyfit(np.log([0.01, 0.005, 0.0025]), np.log(np.abs(drift[first, 0])), 1)[0])
-    ds = xr.Dataset(
-        {
-            "energy_drift": (
-                ("energy_method", "span"), drift,
-                {"long_name": "relative change of the energy without friction", "units": "1"},
-            ),
-            "energy_steps": (("energy_method", "span"), steps, {"long_name": "steps", "units": "1"}),
-        },
-        {
-            "energy_method": ("energy_method", list(methods), {"long_name": "method"}),
-            "span": ("span", spans, {"long_name": "span of time", "units": "s"}),
-        },
-    )  # fmt: skip
-    return ds, lines, order
-
-
 # ---- output ----------------------------------------------------------------------------------
 
 
@@ -754,12 +673,9 @@ def main() -> None:
     where = machine()
     print(where, flush=True)
     ds, chosen = draw_maps(given.quick)
-    checks = crosscheck(given.quick)
-    print(f"reference checked: {time.perf_counter() - begin:.0f} s", flush=True)
     wild, lines = try_extremes()
     print(f"extremes: {time.perf_counter() - begin:.0f} s", flush=True)
-    energy, losses, order = drifts(given.quick)
-    ds = ds.merge(wild).merge(energy)
+    ds = ds.merge(wild)
     ds.attrs = {
         "Conventions": "CF-1.11",
         "title": "ringsweep: where solvers are right, flagged, silent or failed",
@@ -772,15 +688,9 @@ def main() -> None:
         ("Maps", markdown(
             ["map", "runs", *(name.replace("_", " ") for name in CLASSES), "silent in kind",
              "certified beyond the limit", "reference uncertified"], counts(ds, chosen))),
-        ("Reference (implicit, rtol 1e-11) against others", markdown(
-            ["scene", "v0 (m/s)", "alpha (s/m)", "ours", "brute force by", "same kind", "Δ t_separation (s)",
-             "Δ phi_end to rk4 (rad)"], checks)),
         ("Extremes", markdown(
             ["extreme", "check", "auto", "certified", "steps", "ms", "class", "rk4, 15000 steps", "certified", "steps",
              "ms", "class", "λh"], lines)),
-        ("Energy without friction: relative change (steps)", markdown(
-            ["method", *(f"{span:g} s" for span in energy["span"].values)], losses)
-         + f"\nThe loss of rk4 over 10 s falls with the power {order:.2f} of the step (theory: 5)."),
     ]  # fmt: skip
     text = f"Wrong: another regime, motion or contact, or an error of more than {CLOSE:g} rad or s.\n{REFERENCE}"
     text += "".join(f"\n## {title}\n\n{body}" for title, body in sections)
