@@ -30,191 +30,22 @@ import yaml
 
 from benchmarks.hostile.attack import Report
 
-_BELT: dict[str, Any] = {
-    "model": "belt",
-    "body": {"mass": "1 kg"},
-    "spring": {"stiffness": 2.0},
-    "belt": {"velocity": "10 cm/s"},
-    "time": {"span": "5 s"},
-}
-_RING: dict[str, Any] = {
-    "model": "ring",
-    "body": {"mass": 0.076, "inertia": "4.47e-5 kg m^2", "half_distance": "25 mm", "ball_radius": 0.01},
-    "ring": {"radius": "43.378 mm"},
-    "zone": {"half_angle": "15 deg"},
-    "drive": {"law": "arctan", "amplitude": 2.0},
-    "time": {"span": 1.0},
-}
-_PAIRS = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
+_VOCABULARY = yaml.safe_load(Path(__file__).with_name("vocabulary.yaml").read_text(encoding="utf-8"))
 
-#: Scenes that run, with the paths that are swept and two values for each.
-KINDS: dict[str, tuple[dict[str, Any], dict[str, list[Any]]]] = {
-    "ring": (
-        _RING | {"friction": {"law": "stiction", **_PAIRS}},
-        {"drive.amplitude": [0.5, 8.0], "zone.half_angle": ["5 deg", 0.6], "initial.omega": [0, 10]},
-    ),
-    "belt": (
-        _BELT | {"friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}},
-        {"belt.velocity": [0.05, 0.3], "friction.mu_s": [0.1, "30 %"], "body.mass": [0.5, "2 kg"]},
-    ),
-    "creep": (
-        _RING | {"friction": {"law": "bengisu-akay", "alpha": 1e5, "v0": 2e-6, **_PAIRS}},
-        {"drive.amplitude": [0.5, 8.0], "friction.v0": [1e-6, "1 mm/s"], "friction.alpha": [10, 1e5]},
-    ),
-    "formula": (
-        _BELT
-        | {
-            "friction": {
-                "law": "formula",
-                "mu": "mu_k + (mu_s - mu_k)/(1 + delta*v)",
-                "at_rest": "mu_s",
-                "delta": "3 s/m",
-                "mu_s": 0.4,
-                "mu_k": 0.3,
-            }
-        },
-        {"belt.velocity": [0.05, 0.3], "friction.delta": [1.0, "1 s/m", 20]},
-    ),
-    "table": (
-        _BELT | {"friction": {"law": "table", "v": [0, 0.1, "1 m/s"], "mu": [0.4, 0.3, 0.25]}},
-        {"belt.velocity": [0.05, 0.3], "friction.scale": [0.5, 1.0]},
-    ),
-    "arcs": (
-        {name: part for name, part in _RING.items() if name != "zone"}
-        | {
-            "friction": {"law": "stiction", "rest": {"mu_s": 0.2, "mu_k": 0.1}},
-            "zones": [
-                {"center": 0, "half_angle": "15 deg", "mu_s": 0.5, "mu_k": 0.3},
-                {"center": "90 deg", "half_angle": 0.2, "mu_s": 0.4, "mu_k": 0.4},
-            ],
-        },
-        {"drive.amplitude": [0.5, 8.0], "zones.1.center": [1.0, "180 deg"]},
-    ),
-    "measured": (
-        {name: part for name, part in _RING.items() if name != "drive"}
-        | {
-            "model": "ring-single-contact",
-            "body": {"mass": "76 g"},
-            "friction": {"law": "coulomb", "rough": {"mu_k": 0.5}, "rest": {"mu_k": 0.2}},
-            "drive": {"law": "table", "time": [0, 0.5, 1, "2 s", 3], "theta": [0, 0.1, "20 deg", 0.6, 0.5]},
-        },
-        {"zone.half_angle": ["5 deg", 0.6], "initial.phi": [0.1, "1 rad"]},
-    ),
-}
+#: Scenes that run, with the paths that are swept and values for each.
+KINDS: dict[str, dict[str, Any]] = _VOCABULARY["kinds"]
 
 #: The kinds whose kernels most tests compile too.
 COMMON = ("ring", "belt")
 
 _NUMBERS = [0, -1, 1, 3, 1e-300, 5e-324, 1e300, -1e308, 1.7e308, 0.5, 1e6, 1e-9, math.nan, math.inf, 10**30, 7**6000]
-_WORDS = ["", "x", "0x1F", "1e5", "1_000", "010", "1:30", "nan", "-.inf", "~", "yes", "15deg", "3 kg", "5 s/m", "2 m/s"]
-_WORDS += [
-    "1e400",
-    "10 %",
-    "1/0",
-    "five",
-    "µ",
-    "\N{DEGREE SIGN}",
-    "5 5",
-    "--",
-    "1 m^2 kg/s",
-    "x" * 5000,
-    "{",
-    "a: b",
-    "*a",
-]
-_OTHERS = [None, True, False, [], {}, [1], [1, 2, 3], {"a": 1}, [[1, 2], [3, 4]], {"linspace": [0, 1, 2]}]
-_KEYS = [
-    "law",
-    "mu_s",
-    "mu_k",
-    "alpha",
-    "extra",
-    "mass",
-    "span",
-    "velocity",
-    "file",
-    "mu",
-    "at_rest",
-    "gravity",
-    "x",
-    "",
-]
-_KEYS += ["viscous", "center", "1", "stiffness", "classify", "initial", "drive", "zone", "zones", "force", "damper"]
-_FORMULAS = [
-    "mu_k",
-    "mu_s/(1 + delta*v)",
-    "mu_k*exp(-v*delta)",
-    "min(mu_s, mu_k + delta*v)",
-    "piecewise(v < w, mu_s, mu_k)",
-]
-_TOKENS = [
-    "v",
-    "mu_s",
-    "mu_k",
-    "delta",
-    "+",
-    "-",
-    "*",
-    "/",
-    "**",
-    "(",
-    ")",
-    "exp(",
-    "1",
-    "0",
-    "2.5",
-    "sqrt(",
-    ",",
-    "^",
-    "=",
-]
-_SOLVERS: list[Any] = [
-    {"method": "auto", "max_steps": 1000},
-    {"method": "auto", "max_steps": 100_000, "certify": False},
-    {"method": "event", "max_steps": 100_000, "rtol": 1e-9},
-    {"method": "implicit", "max_steps": 100_000, "rtol": 1e-5},
-    {"method": "rk4", "steps": 50},
-    {"method": "rk4", "steps": 200, "certify": False},
-    {"method": "rk4"},
-    "auto",
-    "rk4",
-    {"method": "event", "max_steps": 1000, "rtol": -1},
-    {"method": "auto", "steps": 10},
-]
-_REFINEMENTS = [True, {}, {"stride": 2}, {"stride": 2, "audit": 1.0}, {"stride": 0}, {"audit": 2}, {"axes": ["x"]}, 3]
-_SPACINGS: list[Any] = [
-    {"linspace": [0.1, 1.0, 2]},
-    {"geomspace": [0.1, 1.0, 2]},
-    {"linspace": [1, 1, 2]},
-    {"geomspace": [-1, 1, 2]},
-    {"linspace": [-1.7e308, 1.7e308, 3]},
-    {"linspace": [0, 1, 0]},
-    {"linspace": [0, 1, 1e9]},
-    {"linspace": [0, 1]},
-    {"linspace": ["1 deg", "2 kg", 2]},
-    {"logspace": [0, 1, 2]},
-]
-
-# Variables that have no number where something did not happen, or was not bounded. Under a law that jumps the stiffness
-# is infinite, and bounds on errors may be.
-_MAY_BE_MISSING = {
-    "t_separation",
-    "first_slip",
-    "period",
-    "stiffness",
-    "stops_per_cycle",
-    "swing",
-    "stick_share",
-    "normal_min_2",
-    "normal_max_2",
-    "jump_max",
-    "t_jump_max",
-}
+_JUNK = [_NUMBERS, [*_VOCABULARY["words"], "x" * 5000], _VOCABULARY["others"]]
 
 
 def random_configuration(draw: random.Random, kinds: Collection[str]) -> str:
     """Text of a configuration: one that runs, with up to three mutations."""
-    scene, swept = copy.deepcopy(KINDS[draw.choice(list(kinds))])
+    kind = copy.deepcopy(KINDS[draw.choice(list(kinds))])
+    scene, swept = kind["scene"], kind["swept"]
     solver: Any = {"method": "auto", "max_steps": 100_000}
     paths = draw.sample(list(swept), draw.randint(0, 2))
     tree: dict[str, Any] = {"scene": scene, "solver": solver}
@@ -249,8 +80,12 @@ def _place(tree: Any, draw: random.Random) -> tuple[Any, Any]:
     return draw.choice(list(_places(tree)) or [(tree, "scene")])
 
 
+def _word(draw: random.Random, name: str) -> Any:
+    return copy.deepcopy(draw.choice(_VOCABULARY[name]))
+
+
 def _junk(draw: random.Random) -> Any:
-    return copy.deepcopy(draw.choice(draw.choice([_NUMBERS, _WORDS, _OTHERS])))
+    return copy.deepcopy(draw.choice(draw.choice(_JUNK)))
 
 
 def _replace(tree: Any, draw: random.Random) -> None:
@@ -268,9 +103,7 @@ def _scale(tree: Any, draw: random.Random) -> None:
 def _respell(tree: Any, draw: random.Random) -> None:
     node, key = _place(tree, draw)
     if isinstance(node[key], int | float) and not isinstance(node[key], bool) and abs(node[key]) < 1e300:
-        node[key] = (
-            f"{node[key]} {draw.choice(['', 'm', 'mm', 'kg', 's', 'deg', 'rad/s', 'm/s', 'rpm', '%', 'N/m', 'q'])}"
-        )
+        node[key] = f"{node[key]} {_word(draw, 'units')}"
 
 
 def _misspell(tree: Any, draw: random.Random) -> None:
@@ -287,11 +120,11 @@ def _remove(tree: Any, draw: random.Random) -> None:
 
 def _add(tree: Any, draw: random.Random) -> None:
     sections = [node for node, _ in _places(tree) if isinstance(node, dict)] or [tree]
-    draw.choice(sections)[draw.choice(_KEYS)] = _junk(draw)
+    draw.choice(sections)[_word(draw, "keys")] = _junk(draw)
 
 
 def _resolve(tree: Any, draw: random.Random) -> None:
-    tree["solver"] = copy.deepcopy(draw.choice(_SOLVERS))
+    tree["solver"] = _word(draw, "solvers")
 
 
 def _resweep(tree: Any, draw: random.Random) -> None:
@@ -299,34 +132,30 @@ def _resweep(tree: Any, draw: random.Random) -> None:
     if not isinstance(sweep, dict):
         return
     if draw.random() < 0.3:
-        sweep["refine"] = copy.deepcopy(draw.choice(_REFINEMENTS))
+        sweep["refine"] = _word(draw, "refinements")
     grid = sweep.setdefault("grid", {})
     if isinstance(grid, dict):
-        path = draw.choice(
-            [*grid, "drive.amplitude", "friction.mu_k", "friction.law", "body.mass", "nothing", "time.span"]
-        )
-        grid[path] = copy.deepcopy(draw.choice([*_SPACINGS, _junk(draw)]))
+        path = draw.choice([*grid, *_VOCABULARY["paths"]])
+        grid[path] = draw.choice([_word(draw, "spacings"), _junk(draw)])
 
 
 def _reformulate(tree: Any, draw: random.Random) -> None:
     friction = tree.get("scene", {}).get("friction") if isinstance(tree.get("scene"), dict) else None
     if not isinstance(friction, dict) or "at_rest" not in friction:
         return
-    tokens = [draw.choice(_TOKENS) for _ in range(draw.randint(1, 9))]
-    friction["mu"] = draw.choice([*_FORMULAS[:2], " ".join(tokens), f"mu_k*({' '.join(tokens)})"])
+    tokens = " ".join(_word(draw, "tokens") for _ in range(draw.randint(1, 9)))
+    friction["mu"] = draw.choice([*_VOCABULARY["formulas"], tokens, f"mu_k*({tokens})"])
     friction["at_rest"] = draw.choice(["mu_s", "mu_s", "mu_k", None, "v", 3])
 
 
-_MUTATIONS: list[Callable[[Any, random.Random], None]] = [
-    *(_replace, _scale, _scale, _respell, _misspell, _remove, _add, _resolve, _resweep, _reformulate)
-]
+_MUTATIONS: tuple[Callable[[Any, random.Random], None], ...] = (
+    _replace, _scale, _scale, _respell, _misspell, _remove, _add, _resolve, _resweep, _reformulate,
+)  # fmt: skip
 
 
 def _changed_text(text: str, draw: random.Random) -> str:
     i = draw.randrange(len(text))
-    piece = draw.choice(
-        ["", " ", "\t", "\n", ":", "- ", "&a ", "*a", "!!int ", '"', "[", "}", "#", "\x00", "\ufffe", "é"]
-    )
+    piece = _word(draw, "pieces")
     return text[:i] + piece + text[i + draw.randint(0, 5) :]
 
 
@@ -438,7 +267,7 @@ def _not_finite(target: Path) -> list[str]:
             if variable.dtype.kind != "f" or "time" in variable.dims:
                 continue
             values = variable.values[good] if variable.shape == good.shape else variable.values
-            missing = name in _MAY_BE_MISSING or str(name).endswith("_error")
+            missing = name in _VOCABULARY["may_be_missing"] or str(name).endswith("_error")
             unbounded = name == "stiffness" or str(name).endswith("_error")
             if (np.isinf(values).any() and not unbounded) or (np.isnan(values).any() and not missing):
                 problems.append(f"{name} is not finite in a cell that did not fail")
