@@ -14,8 +14,8 @@ from matplotlib.text import Text
 from ringsweep import plots
 from ringsweep.plots.datasets import FLIGHT, PIVOT, phases
 from ringsweep.plots.films import _Film
-from ringsweep.plots.rig import ring_history
 from ringsweep.plots.look import AFTERMATH_COLOURS
+from ringsweep.plots.rig import ring_history
 from ringsweep.quantities.flags import AFTERMATHS, OPEN, SEPARATING, TUMBLED
 from ringsweep.quantities.variables import HISTORY, IMPACTS, OUTCOMES
 

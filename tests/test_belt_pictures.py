@@ -16,8 +16,8 @@ from ringsweep.models import parameters
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.plots import films
-from ringsweep.plots.phase import _MODE_STYLES
 from ringsweep.plots.look import PAIR_COLOURS
+from ringsweep.plots.phase import _MODE_STYLES
 
 # m = 1 kg, k = 2 N/m, so the natural frequency is sqrt(2).
 LOAD, STIFFNESS, BELT = 9.81, 2.0, 0.1

@@ -10,7 +10,10 @@ import pytest
 import yaml
 
 from ringsweep import cli
-from ringsweep.config import load
+from ringsweep.config import load, with_values
+from ringsweep.physics import PAPER
+from ringsweep.physics.friction import LAWS, TRAITS
+from ringsweep.storage.provenance import references
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("README.md", "CONTRIBUTING.md")
@@ -78,3 +81,31 @@ def test_changelog_counts_the_notebooks():
     counts = ("six", "seven", "eight", "nine", "ten", "eleven", "twelve")
     number = len(list((ROOT / "notebooks").glob("*.ipynb")))
     assert f"{counts[number - 6]} notebooks" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_source_of_a_law_is_on_the_page_of_references(law):
+    rows = (ROOT / "docs/references.md").read_text(encoding="utf-8").splitlines()
+    (row,) = (row for row in rows if row.startswith("|") and f"`{law}`" in row)
+    source = TRAITS[LAWS[law]].source
+    if source == PAPER:
+        assert "the paper" in row
+    elif source:
+        author, year = source.partition(",")[0].removesuffix(" et al."), re.search(r"\((\d{4})\)", source)
+        assert author in row
+        assert year[1] in row
+
+
+def test_file_cites_its_own_model_and_law():
+    belt = {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 2.0},
+        "belt": {"velocity": 0.1},
+        "friction": {"law": "tustin", "mu_s": 0.15, "mu_k": 0.1, "alpha": 1.0},
+        "time": {"span": 1.0},
+    }
+    cited = references(with_values({"scene": belt}))
+    assert "Tustin" in cited
+    assert "Popp" in cited
+    assert PAPER not in cited

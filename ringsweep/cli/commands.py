@@ -237,6 +237,9 @@ def info_command(arguments: argparse.Namespace) -> None:
 
     sealed = netcdf.check(arguments.dataset)
     with netcdf.reading(arguments.dataset) as result:
+        if arguments.cite:
+            print(result.attrs["references"])
+            return
         _print_summary(arguments.dataset, result)
     print("seal:", "the file is what ringsweep wrote" if sealed else "none, so damage would not be noticed")
 

@@ -209,6 +209,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     info = _add_command(commands, "info", info_command, "print a summary of a result file", "ringsweep info my.nc")
     info.add_argument("dataset", metavar="OUT.nc")
+    info.add_argument("--cite", action="store_true", help="print only what a paper that uses it can cite")
 
     verify = _add_command(commands, "verify", verify_command, "check that files are what ringsweep wrote", """
         ringsweep verify my.nc             exit status 0, or 2 if it is damaged, was changed, or has no seal

@@ -95,6 +95,8 @@ class Model(ABC):
         Name in configurations.
     doc : str
         Short description, for the titles of datasets.
+    reference : str
+        What a paper that uses a result can cite for the model.
     outcomes : tuple of str
         Names of the outcomes, in the order in which ``recorder.conclude`` returns them. Each is a key of
         :data:`ringsweep.quantities.variables.OUTCOMES`.
@@ -117,6 +119,7 @@ class Model(ABC):
 
     name: ClassVar[str]
     doc: ClassVar[str]
+    reference: ClassVar[str] = ""
     outcomes: ClassVar[tuple[str, ...]]
     place: ClassVar[str]
     driven: ClassVar[tuple[str, ...]] = ()

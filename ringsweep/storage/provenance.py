@@ -22,12 +22,7 @@ from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.config import Config
 from ringsweep.models import model_of
 from ringsweep.models.scene import LAW
-
-#: What a paper that uses a result can cite.
-REFERENCES = (
-    "S. Alaci et al., Some Aspects of the Effects of Dry Friction Discontinuities on the Behaviour of Dynamic Systems, "
-    "Computation 2024, 12(9), 181, https://doi.org/10.3390/computation12090181"
-)
+from ringsweep.physics.friction import TRAITS
 
 # Reading the metadata of a package takes milliseconds.
 _version = cache(version)
@@ -143,7 +138,7 @@ def attributes(config: Config) -> dict[str, Any]:
         "title": f"ringsweep: {model.doc}",
         "source": source,
         "history": f"{now} computed by {source}",
-        "references": REFERENCES,
+        "references": references(config),
         "comment": "angles are in radians; a number is missing (NaN) where the run has none, for example no separation",
         "ringsweep_version": _version("ringsweep"),
         "ringsweep_sources": digest,
@@ -156,6 +151,13 @@ def attributes(config: Config) -> dict[str, Any]:
         "configuration": json.dumps({**config.source, "scene": _with_defaults(config)}),
         "date_created": now,
     }
+
+
+def references(config: Config) -> str:
+    """What a paper that uses a result can cite: the software, the model and the friction laws, a line each."""
+    laws = (TRAITS[structure.law_type].source for structure in config.scene.structures.values())
+    cited = f"ringsweep {_version('ringsweep')}", model_of(config.scene.structure).reference, *laws
+    return "\n".join(dict.fromkeys(filter(None, cited)))
 
 
 def _with_defaults(config: Config) -> dict[str, Any]:

@@ -42,6 +42,10 @@ class Belt(Model, Continues):
     name: ClassVar[str] = "belt"
     ends: ClassVar[tuple[str, ...]] = ("x_end", "velocity_end")
     doc: ClassVar[str] = "a mass on a spring on a moving belt"
+    reference: ClassVar[str] = (
+        "K. Popp, P. Stelter, Stick-slip vibrations and chaos, Philosophical Transactions of the Royal Society A 332, "
+        "89-105 (1990)"
+    )
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
     place: ClassVar[str] = "x"
     driven: ClassVar[tuple[str, ...]] = ("belt_x", "belt_velocity")

@@ -17,7 +17,7 @@ from ringsweep.models.model import Continues, Model, period_of, phases
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
 from ringsweep.models.ring import long_run, record
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.physics import contact, drives, friction, ring, zones
+from ringsweep.physics import PAPER, contact, drives, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
 
@@ -43,6 +43,7 @@ class SingleContactRing(Model, Continues):
 
     name: ClassVar[str] = "ring-single-contact"
     doc: ClassVar[str] = "a small body in a rotating ring, one contact"
+    reference: ClassVar[str] = PAPER
     outcomes: ClassVar[tuple[str, ...]] = record.Outcome._fields
     place: ClassVar[str] = "phi"
     ends: ClassVar[tuple[str, ...]] = ("phi_end", "omega_end")

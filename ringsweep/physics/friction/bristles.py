@@ -317,11 +317,16 @@ def _recoil_stick_speed(law, recoil):
     return recoil
 
 
+_DAHL = "P. R. Dahl, AIAA Journal 14, 1675-1682 (1976), doi:10.2514/3.61511"
+_DE_WIT = "C. Canudas de Wit et al., IEEE Transactions on Automatic Control 40, 419-425 (1995), doi:10.1109/9.376053"
+_DUPONT = "P. Dupont et al., IEEE Transactions on Automatic Control 47, 787-792 (2002), doi:10.1109/TAC.2002.1000274"
+_HAESSIG = "D. A. Haessig, B. Friedland, Journal of Dynamic Systems, Measurement, and Control 113, 354-362 (1991)"
+
 #: Laws by the name that the configuration gives them.
 LAWS = {
-    "dahl": (Dahl, Traits(Dynamic, coefficients=("mu_k",))),
-    "lugre": (LuGre, Traits(Dynamic)),
-    "elasto-plastic": (ElastoPlastic, Traits(Dynamic)),
-    "reset-integrator": (ResetIntegrator, Traits(Dynamic)),
-    "bristle": (Bristles, Traits(Dynamic, coefficients=("mu_k",), snaps=True)),
+    "dahl": (Dahl, Traits(Dynamic, coefficients=("mu_k",), source=_DAHL)),
+    "lugre": (LuGre, Traits(Dynamic, source=_DE_WIT)),
+    "elasto-plastic": (ElastoPlastic, Traits(Dynamic, source=_DUPONT)),
+    "reset-integrator": (ResetIntegrator, Traits(Dynamic, source=_HAESSIG)),
+    "bristle": (Bristles, Traits(Dynamic, coefficients=("mu_k",), snaps=True, source=_HAESSIG)),
 }

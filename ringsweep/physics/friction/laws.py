@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 from ringsweep.numerics.expressions import SPEED, add, multiply, negative, number, switch, symbol, symbols_of
+from ringsweep.physics import PAPER
 from ringsweep.physics.definitions import Definitions
 from ringsweep.physics.friction.formula import COEFFICIENTS, FormulaError, Threshold, read_expression, read_formula
 from ringsweep.physics.friction.registry import SetValued, Smooth, Traits, add_law, describe
@@ -60,6 +61,7 @@ def _law(
     at_rest: str | None = None,
     band: str | None = None,
     ascending: tuple[str, str] | None = None,
+    source: str = "",
     **parameters: Parameter,
 ) -> type:
     """Define a law and register it under its name."""
@@ -79,6 +81,7 @@ def _law(
             coefficients=_coefficients(used, at_rest),
             ascending=ascending,
             dead_band=set_valued and band is not None,
+            source=source,
         ),
     )
     return law
@@ -98,6 +101,7 @@ Coulomb = _law(
     """Amontons-Coulomb friction: :math:`\\mu_k` against the motion (the paper's Eqs. 25-26).""",
     mu="mu_k",
     at_rest="mu_k",
+    source="C. A. Coulomb, Théorie des machines simples, Bachelier, Paris (1821)",
 )
 
 Stiction = _law(
@@ -105,6 +109,7 @@ Stiction = _law(
     """Coulomb friction with stiction: up to :math:`\\mu_s` at rest, :math:`\\mu_k` in motion.""",
     mu="mu_k",
     at_rest="mu_s",
+    source="C. A. Coulomb, Théorie des machines simples, Bachelier, Paris (1821)",
 )
 
 Tustin = _law(
@@ -113,6 +118,7 @@ Tustin = _law(
     mu="mu_k + (mu_s - mu_k)*exp(-alpha*v)",
     at_rest="mu_s",
     alpha=_ALPHA,
+    source="A. Tustin, Journal of the IEE 94 (1947)",
 )
 
 GaussianStribeck = _law(
@@ -121,6 +127,7 @@ GaussianStribeck = _law(
     mu="mu_k + (mu_s - mu_k)*exp(-(v/v_s)**2)",
     at_rest="mu_s",
     v_s=_V_S,
+    source="B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer (1991)",
 )
 
 Hyperbolic = _law(
@@ -129,6 +136,7 @@ Hyperbolic = _law(
     mu="mu_k + (mu_s - mu_k)/(1 + delta*v)",
     at_rest="mu_s",
     delta=Parameter("s/m", "decay of friction with sliding speed", lower=0.0),
+    source="R. I. Leine et al., Nonlinear Dynamics 16 (1998), doi:10.1023/A:1008289604683",
 )
 
 Karnopp = _law(
@@ -147,6 +155,7 @@ Karnopp = _law(
     at_rest="mu_s",
     band="dead_band",
     dead_band=Parameter("m/s", "half-width of the dead band D_v", lower=0.0, open_lower=True),
+    source="D. Karnopp, Journal of Dynamic Systems, Measurement, and Control 107 (1985), doi:10.1115/1.3140698",
 )
 
 Threlfall = _law(
@@ -158,6 +167,7 @@ Threlfall = _law(
     mu="piecewise(v < v0, mu_k*(1 - exp(-3*v/v0))/(1 - exp(-3)), mu_k)",
     band="v0",
     v0=_V0,
+    source="D. C. Threlfall, Mechanism and Machine Theory 13, 475-483 (1978)",
 )
 
 PiecewiseLinear = _law(
@@ -168,6 +178,7 @@ PiecewiseLinear = _law(
     ascending=("v0", "v1"),
     v0=_V0,
     v1=_V1,
+    source=PAPER,
 )
 
 PiecewiseCubic = _law(
@@ -179,6 +190,7 @@ PiecewiseCubic = _law(
     ascending=("v0", "v1"),
     v0=_V0,
     v1=_V1,
+    source=PAPER,
 )
 
 BengisuAkay = _law(
@@ -188,6 +200,7 @@ BengisuAkay = _law(
     band="v0",
     alpha=_ALPHA,
     v0=_V0,
+    source="M. T. Bengisu, A. Akay, Journal of Sound and Vibration 171, 557-570 (1994)",
 )
 
 Tanh = _law(
@@ -204,6 +217,7 @@ BrownMcphee = _law(
     mu="mu_k*tanh(4*v/v_t) + (mu_s - mu_k)*(v/v_t)/((v/(2*v_t))**2 + 3/4)**2",
     band="v_t",
     v_t=Parameter("m/s", "speed of the greatest friction", lower=0.0, open_lower=True),
+    source="P. Brown, J. McPhee, Journal of Computational and Nonlinear Dynamics 11 (2016), doi:10.1115/1.4033658",
 )
 
 Andersson = _law(
@@ -212,6 +226,7 @@ Andersson = _law(
     mu="(mu_k + (mu_s - mu_k)*exp(-(v/v_s)**2))*tanh(k_t*v)",
     v_s=_V_S,
     k_t=Parameter("s/m", "steepness of the law at rest", lower=0.0, open_lower=True),
+    source="S. Andersson et al., Tribology International 40, 580-587 (2007)",
 )
 
 

@@ -39,6 +39,8 @@ class Traits:
         Whether its memory jumps at certain instants; only methods with events find these.
     dead_band : bool
         Whether a contact within the stiction band keeps its speed. Then the drive must be steady.
+    source : str
+        What a paper that uses the law can cite.
     """
 
     family: type
@@ -46,6 +48,7 @@ class Traits:
     ascending: tuple[str, str] | None = None
     snaps: bool = False
     dead_band: bool = False
+    source: str = ""
 
 
 #: Laws by the name that the configuration gives them.
