@@ -62,6 +62,13 @@ def sums_in_kernel(c, s):
 
 
 @kernel
+def roots_in_kernel(rows, h, work, roots):
+    """Fill `roots` with the first root of each series, or with `h`."""
+    for i in range(len(roots)):
+        roots[i] = first_root(rows[i], h, work)[0]
+
+
+@kernel
 def products_in_kernel(c, left, right):
     """Fill `c` with products of series that grow side by side: row i is the product of rows i of `left` and `right`."""
     first = newest = no_factors(eight(left, 0))
@@ -255,3 +262,18 @@ def test_products_that_grow_side_by_side_agree_with_numpy():
         c = np.full((PRODUCTS + FACTOR_ROWS, COLUMNS), np.nan)
         products(c, left, right)
         np.testing.assert_allclose(c[:PRODUCTS, 1 : ORDER + 1], expected, atol=1e-13)
+
+
+def test_kernels_and_python_find_the_same_first_roots():
+    rng = np.random.default_rng(54)
+    # Waves of up to three periods in a step: some have no root, some have several.
+    rate, phase, lift = rng.uniform(1.0, 6.0 * pi, 200), rng.uniform(0.0, 2.0 * pi, 200), rng.uniform(0.9, 2.0, 200)
+    powers = np.array([np.cos(phase + 0.5 * pi * k) * rate**k / factorial(k) for k in range(ORDER + 1)]).T
+    rows = np.zeros((200, COLUMNS))
+    rows[:, : ORDER + 1] = powers
+    rows[:, 0] += lift
+    work, found = np.empty((STACK, COLUMNS)), np.empty(200)
+    roots_in_kernel(rows, 1.0, work, found)
+    expected = np.array([first(row, 1.0)[0] for row in rows])
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert 20 < (found == 1.0).sum() < 180

@@ -10,10 +10,23 @@ from math import comb, exp, inf, log, sqrt
 import numpy as np
 
 from ringsweep.compile import absorbed, inlined
-from ringsweep.numerics.terms import NUMBERS, ORDER, numbers_from, powers, set_terms, terms, total
+from ringsweep.numerics.terms import (
+    NUMBERS,
+    ORDER,
+    least,
+    numbers_from,
+    powers,
+    set_terms,
+    sign_changes,
+    terms,
+    total,
+)
 
 #: ``INVERSE[k]`` is 1/k: multiplication is many times cheaper than division.
 INVERSE = np.array([np.inf, *(1.0 / k for k in range(1, ORDER + 3))])
+
+# Weights of the terms in the second derivative.
+_IN_BEND = NUMBERS * (NUMBERS - 1.0)
 
 # Weights of the terms in bounds on the terms above the second power: of a series, and of its derivative.
 _ABOVE = np.where(NUMBERS > 2.0, 1.0, 0.0)
@@ -22,6 +35,13 @@ _ABOVE_IN_SLOPE = NUMBERS * _ABOVE
 # Binomial coefficients, which are exact: of ORDER and k; row k - 1 of the second has those of j and k.
 _CHOOSE = np.array([float(comb(ORDER, k)) for k in range(1, ORDER + 1)])
 _CHOOSE_ALL = np.array([float(comb(j, k)) for k in range(1, ORDER + 1) for j in range(1, ORDER + 1)])
+
+# Weights of coefficient j in the Bernstein basis in coefficients 1 ... ORDER of the left and of the right half, row by
+# row for j = 0 ... ORDER; exact.
+_LEFT_HALF = np.array([comb(k, j) / 2.0**k for j in range(ORDER + 1) for k in range(1, ORDER + 1)])
+_RIGHT_HALF = np.array(
+    [comb(ORDER - k, ORDER - j) / 2.0 ** (ORDER - k) for j in range(ORDER + 1) for k in range(1, ORDER + 1)]
+)
 
 #: Rows of the scratch array for :func:`crossings` and :func:`first_root`.
 STACK = 54
@@ -141,36 +161,54 @@ def first_root(c, h, work):
         if value(c, h) > 0.0:
             return h, False
         return _root_in_bracket(c, 0.0, h), True
+    # Often the series falls all the way to a little beyond the zero of the parabola. The share of the step up to there:
+    end = 1.25 * _zero_of_parabola(c[0], linear, square)
+    if end < 1.0 and max(linear, linear + 2.0 * square * end) < -rest_slope * end * end and value(c, end * h) <= 0.0:
+        return _root_in_bracket(c, 0.0, end * h), True
     return _first_root_by_subdivision(c, h, work)
+
+
+@absorbed
+def _zero_of_parabola(constant, linear, square):
+    """First positive zero of ``constant + linear s + square s^2``, of which `constant` is positive; or infinite."""
+    discriminant = linear * linear - 4.0 * constant * square
+    denominator = sqrt(max(discriminant, 0.0)) - linear
+    return 2.0 * constant / denominator if discriminant >= 0.0 and denominator > 0.0 else inf
 
 
 @inlined
 def _root_in_bracket(c, low, high):
-    """Only zero of a series that is positive at `low` and not at `high`: Newton's method with bisection."""
-    # The zero of the parabola of the first three terms, if it lies in the bracket.
-    square = c[1] * c[1] - 4.0 * c[0] * c[2]
-    root = sqrt(max(square, 0.0))
-    s = 2.0 * c[0] / (root - c[1]) if square >= 0.0 and root > c[1] else low
+    """Only zero of a series that is positive at `low` and not at `high`: Halley's method with bisection."""
+    s = _zero_of_parabola(c[0], c[1], c[2])
     if not (low < s < high):
         s = 0.5 * (low + high)
-    step_before = inf
+    before = inf
     for _ in range(80):
-        f = value(c, s)
+        parts = terms(c) * powers(s)
+        f, rate, bend = (
+            c[0] + s * total(parts),
+            total(parts * numbers_from(NUMBERS, 0)),
+            total(parts * numbers_from(_IN_BEND, 0)),
+        )
         if f > 0.0:
             low = s
         else:
             high = s
-        rate = slope(c, s)
-        step = -f / rate if rate != 0.0 else inf
-        # Small steps that shrink no more are rounding.
-        if abs(step) <= 4e-16 * high or (step_before < 1e-10 * high and abs(step) >= 0.5 * step_before):
+        # `bend` is the second derivative times s.
+        denominator = 2.0 * s * rate * rate - f * bend
+        step = -2.0 * s * f * rate / denominator if denominator != 0.0 else inf
+        # The error of a step shrinks like its third power. Small steps that shrink no more are rounding.
+        size, rounding = abs(step), 1e-16 * high
+        converges = before < inf and size * size * size * size <= rounding * before * before * before
+        if converges or size <= 4.0 * rounding or (before < 1e-10 * high and size >= 0.5 * before):
             return min(max(s + step, low), high)
-        new = s + step
+        new, before = s + step, size
         if not (low < new < high):
-            new = 0.5 * (low + high)
+            # The next step tells nothing about how fast Halley's method converges.
+            new, before = 0.5 * (low + high), inf
             if not (low < new < high):
                 return new
-        s, step_before = new, abs(new - s)
+        s = new
     return s
 
 
@@ -192,14 +230,8 @@ def _first_root_by_subdivision(c, h, work):
     while top >= 0:
         b = work[top]
         start, width = b[ORDER + 1], b[ORDER + 2]
-        changes = 0
-        positive, touches = True, False
-        for k in range(1, ORDER + 1):
-            touches = touches or b[k] <= rounding
-            if (b[k] > 0.0) != positive:
-                positive = not positive
-                changes += 1
-        if changes == 0 and not touches:
+        changes = sign_changes(terms(b))
+        if changes == 0 and least(terms(b)) > rounding:
             top -= 1
         elif changes == 1:
             return _root_in_bracket(c, start, start + width), True
@@ -209,16 +241,19 @@ def _first_root_by_subdivision(c, h, work):
                 return start + width, True
             top -= 1
         else:
-            left = work[top + 1]
-            for k in range(ORDER + 1):
-                left[k] = b[0]
-                for m in range(ORDER - k):
-                    b[m] = 0.5 * (b[m] + b[m + 1])
-            # Now b holds the right half.
-            width *= 0.5
-            left[ORDER + 1], left[ORDER + 2] = start, width
-            b[ORDER + 1], b[ORDER + 2] = start + width, width
+            left, right = b[0] * numbers_from(_LEFT_HALF, 0), b[0] * numbers_from(_RIGHT_HALF, 0)
+            for j in range(1, ORDER + 1):
+                left = left + b[j] * numbers_from(_LEFT_HALF, j * ORDER)
+                right = right + b[j] * numbers_from(_RIGHT_HALF, j * ORDER)
             top += 1
+            half = work[top]
+            half[0] = b[0]
+            set_terms(half, left)
+            set_terms(b, right)
+            b[0] = half[ORDER]
+            width *= 0.5
+            half[ORDER + 1], half[ORDER + 2] = start, width
+            b[ORDER + 1], b[ORDER + 2] = start + width, width
     return h, False
 
 

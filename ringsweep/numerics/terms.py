@@ -118,6 +118,45 @@ def _total(typingctx, values):
 _in_kernels(total, lambda values: _total(values))
 
 
+def least(values):
+    """Least of the lanes."""
+    return values.min()
+
+
+@intrinsic
+def _least(typingctx, values):
+    def lower(context, builder, sig, args):
+        kind = ir.FunctionType(ir.DoubleType(), [args[0].type])
+        fold = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fmin.v{args[0].type.count}f64")
+        return builder.call(fold, [args[0]], fastmath=("nnan",))
+
+    return types.float64(_TERMS), lower
+
+
+_in_kernels(least, lambda values: _least(values))
+
+
+def sign_changes(values):
+    """Number of sign changes along the lanes, which a positive number precedes; zero counts as negative."""
+    positive = np.concatenate([[True], values > 0.0])
+    return int((positive[1:] != positive[:-1]).sum())
+
+
+@intrinsic
+def _sign_changes(typingctx, values):
+    def lower(context, builder, sig, args):
+        bits = ir.IntType(ORDER)
+        zeros = ir.Constant(_TERMS_VECTOR, [0.0] * ORDER)
+        positive = builder.bitcast(builder.fcmp_ordered(">", args[0], zeros), bits)
+        before = builder.or_(builder.shl(positive, ir.Constant(bits, 1)), ir.Constant(bits, 1))
+        return builder.zext(builder.ctpop(builder.xor(positive, before)), ir.IntType(64))
+
+    return types.int64(_TERMS), lower
+
+
+_in_kernels(sign_changes, lambda values: _sign_changes(values))
+
+
 # ---- products of several series ---------------------------------------------------------------
 
 # Products grow side by side in groups of PRODUCTS. The factors of a group are a pair, left ones and right ones: in

@@ -11,6 +11,7 @@ from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface import modes, recorder, series, variation
 from ringsweep.numerics.clock import later
 from ringsweep.numerics.series import ORDER, ascending, first_root
+from ringsweep.numerics.terms import powers, terms, total
 from ringsweep.solvers.variation import along_series, enter_series
 
 _with_record = replacing("record")
@@ -22,7 +23,7 @@ def _first_event(c, first, entry_guard, h, work):
 
     `entry_guard` is zero at the beginning; that root is divided out.
     """
-    event = -1
+    event, longest, scales = -1, h, powers(h)
     for g in range(first, c.shape[0]):
         row = c[g]
         if g == entry_guard:
@@ -37,6 +38,9 @@ def _first_event(c, first, entry_guard, h, work):
             return g, 0.0
         if isnan(row[0]):
             return -1, nan
+        # Most guards are farther from zero than the sum of their terms.
+        if row[0] > longest * total(abs(terms(row)) * scales):
+            continue
         s, found = first_root(row, h, work)
         # Of guards that vanish together the first one counts.
         if found and (event < 0 or s < h * (1.0 - 1e-14)):
