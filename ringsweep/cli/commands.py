@@ -164,14 +164,12 @@ def threshold_command(arguments: argparse.Namespace) -> None:
 def fit_command(arguments: argparse.Namespace) -> None:
     """Fit numbers of a scene to a measured history, write and draw the fit."""
     from ringsweep.config import load
-    from ringsweep.runs.fit import fitted, in_words, ranges_of
+    from ringsweep.runs.fit import dataset, fitted
 
-    name = arguments.output or f"{load(arguments.config, arguments.set).name}-fit.nc"
-    target, picture = _outputs(name, "standard_error", "fit")
-
-    options = {"start": arguments.start, "noise": arguments.noise, "settings": arguments.set}
-    result = fitted(arguments.config, arguments.data, ranges_of(arguments.vary), **options)
-    _store(result, target, picture, in_words(result), "fit")
+    config = load(arguments.config, arguments.set)
+    target, picture = _outputs(arguments.output or f"{config.name}-fit.nc", "residual", "fit")
+    result = dataset(fitted(config, arguments.data, arguments.vary, arguments.start, arguments.noise))
+    _store(result, target, picture, result.attrs["fit_report"], "fit")
 
 
 def _other_scene(target: Path, result: Any) -> str:
@@ -282,10 +280,8 @@ def _print_summary(name: str, result: Any) -> None:
         from ringsweep.cli.precision_table import report
 
         print(report(result))
-    elif "standard_error" in result:
-        from ringsweep.runs.fit import in_words
-
-        print(in_words(result))
+    elif "fit_report" in result.attrs:
+        print(result.attrs["fit_report"])
     else:
         from ringsweep.cli.report import summarise
 

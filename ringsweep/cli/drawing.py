@@ -110,7 +110,7 @@ def _name_part(held: str) -> str:
 
 def draw_plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     """Draw the history of a run, errors against run time, a fit, or a sampled sweep."""
-    if "standard_error" in result:
+    if "residual" in result:
         given = (arguments.kind, arguments.law, arguments.word, arguments.begin, arguments.end)
         if arguments.sel or any(option is not None for option in given):
             raise InputError(str(dataset), "is a fit, of which there is one picture: leave other options out")

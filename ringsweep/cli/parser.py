@@ -130,7 +130,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_settings(threshold)
 
     fit = _add_command(commands, "fit", fit_command,
-        "numbers of a scene with which its history is nearest to a measured one", """
+        "fit parameters of a scene to a measured time history", """
         ringsweep fit my.yaml --data run.csv --vary friction.rough.mu_k,zone.half_angle
         ringsweep fit my.yaml --data run.csv --vary "friction.rough.mu_k=0.1..0.6" --noise "0.5 deg"
         The first line of run.csv names the columns: t (s), and phi (deg) or x (mm).
@@ -141,7 +141,9 @@ def build_parser() -> argparse.ArgumentParser:
         "--vary", required=True, metavar="PATHS", help="numbers to fit: PATH or PATH=LOW..HIGH, separated by commas"
     )
     fit.add_argument("-o", "--output", metavar="FIT.nc", help="default: the configuration's name with -fit")
-    fit.add_argument("--start", type=whole_number, metavar="N", help="minimisations, each from its start (default: 8)")
+    fit.add_argument(
+        "--start", type=whole_number, default=8, metavar="N", help="minimisations, each from its start (default: 8)"
+    )
     fit.add_argument("--noise", metavar="S", help="standard deviation of a measurement (default: by the residuals)")
     _add_settings(fit)
 

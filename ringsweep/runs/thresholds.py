@@ -106,19 +106,14 @@ def threshold(
     """
     if isinstance(config, Mapping) and "scene" not in config:
         config = {"scene": config}
-    try:
-        low, high = (None, None) if between is None else between
-    except (TypeError, ValueError):
-        problem = f"the two ends of an interval are expected, such as (0.5, 8), got {show(between)}"
-        raise InputError("between", problem) from None
-    return locate(config, path, regime, (low, high), tolerance, scan=scan, jobs=jobs)
+    return locate(config, path, regime, between, tolerance, scan=scan, jobs=jobs)
 
 
 def locate(
     config: str | os.PathLike[str] | Mapping[str, Any],
     path: str,
     regime: str,
-    between: tuple[Any, Any],
+    between: Any,
     tolerance: Any,
     *,
     scan: int | None = None,
@@ -139,9 +134,9 @@ def locate(
     sampled = () if whole.sample is None else (one for factor in whole.sample.factors for one in factor.paths)
     check_word(regime, whole.scene, {path, *whole.axes.columns, *sampled})
     if whole.sample is not None:
-        low, high = _ends(whole, path, between)
+        low, high = interval(whole, path, between)
         return distribution(whole, path, regime, *_scan(whole, path, (low, high), tolerance, scan), jobs=jobs)
-    one, low, high = _interval(config, path, between, settings)
+    one, low, high = _single_run(config, path, between, settings)
     values, allowed = _scan(one, path, (low, high), tolerance, scan)
     scanned = load(dict(one.source) | {"sweep": {"grid": {path: values.tolist()}}})
     runs = compute(scanned, Execution(jobs, progress=False))
@@ -267,22 +262,26 @@ def _scan(
     return values, allowed
 
 
-def _ends(whole: Config, path: str, between: tuple[Any, Any]) -> tuple[float, float]:
-    """Ends of the interval in SI units: as given, or those of the sweep."""
+def interval(whole: Config, path: str, between: Any, *forms: tuple[str, str]) -> tuple[float, float]:
+    """Ends of an interval in SI units: as given, or those of the sweep; `forms` are options as for `tell_unit`."""
     parameter = swept_parameter(sweepable(whole.scene), path, "path")
     if isinstance(parameter, Choice) or parameter.whole:
         raise InputError("path", f"{path} is no number that varies continuously: there is nothing to halve")
+    try:
+        low, high = (None, None) if between is None else between
+    except (TypeError, ValueError):
+        problem = f"the two ends of an interval are expected, such as (0.5, 8), got {show(between)}"
+        raise InputError("between", problem) from None
     swept = whole.axes.columns
     own: NDArray[Any] | None = swept[path][1] if path in swept else None
     ends = []
-    for where, given, of_sweep in (("from", between[0], np.min), ("to", between[1], np.max)):
+    forms = forms or (("--from", "{}"), ("--to", "{}"))
+    for where, form, given, of_sweep in zip(("from", "to"), forms, (low, high), (np.min, np.max), strict=True):
         if given is None and own is None:
-            raise InputError(
-                where,
-                f"the configuration does not sweep {path}: say where to look, by --from and --to (in Python: between)",
-            )
+            options = " and ".join(dict.fromkeys(option for option, _ in forms))
+            raise InputError(where, f"the configuration does not sweep {path}: say where to look, by {options}")
         if isinstance(given, str):
-            tell_unit(f"--{where}", "{}", given, as_written(whole, path), parameter)
+            tell_unit(*form, given, as_written(whole, path), parameter)
         ends.append(float(of_sweep(np.asarray(own))) if given is None else quantity(given, parameter, where))
     if not ends[0] < ends[1]:
         unit = after_number(parameter.unit)
@@ -299,9 +298,9 @@ def _beside_axes(config: Any, path: str, settings: list[str]) -> list[str]:
     return [one for one in settings if one.partition("=")[0].strip().removeprefix("scene.") not in others]
 
 
-def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[str]) -> tuple[Config, float, float]:
+def _single_run(config: Any, path: str, between: Any, settings: list[str]) -> tuple[Config, float, float]:
     """Configuration of a single run, and the ends of the interval in SI units."""
-    low, high = _ends(load(config, _beside_axes(config, path, settings)), path, between)
+    low, high = interval(load(config, _beside_axes(config, path, settings)), path, between)
     try:
         one = with_values(config, [*settings, (path, low)])
     except InputError as error:

@@ -244,7 +244,7 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
     ----------
     path : path-like
         File that exists.
-    mark : {"regime", "time", "contender", "probability", "standard_error", "vertex"}
+    mark : {"regime", "time", "contender", "probability", "residual", "vertex"}
         Dimension or variable by which the kind is known: sweep, history, error against run time, sampled sweep,
         fit, or boundary.
     content : str
@@ -256,7 +256,7 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
         If it is no file of this package, or a result of another kind.
     """
     with open_dataset(path) as existing:
-        marks = ("contender", "time", "probability", "standard_error", "vertex", "regime")
+        marks = ("contender", "time", "probability", "residual", "vertex", "regime")
         kinds = [kind for kind in marks if kind in existing.dims or kind in existing]
     if kinds[:1] != [mark]:
         raise InputError(str(path), f"holds a result of another kind: name another file for this {content}")
