@@ -2,8 +2,8 @@
 
 from ringsweep.plots.datasets import require_one_run
 from ringsweep.plots.labels import label_axis
+from ringsweep.plots.look import axes_or_current, place_legend
 from ringsweep.plots.phase import draw_modes
-from ringsweep.plots.style import axes_or_current, place_legend
 
 
 def reactions(ds, ax=None):
