@@ -115,7 +115,9 @@ def test_accessor_is_there_for_a_file_that_xarray_alone_has_opened(imports):
 
 def mapped(scene, axes, points=False):
     """Dataset of a sweep without computing it."""
-    return sweep._frame(load({"scene": scene, "sweep": {"points" if points else "grid": axes}}), None)
+    config = load({"scene": scene, "sweep": {"points" if points else "grid": axes}})
+    coords, attrs = sweep._coordinates_and_attributes(config, None)
+    return xr.Dataset(coords=coords, attrs=attrs)
 
 
 class TestCell:

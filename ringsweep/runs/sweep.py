@@ -257,7 +257,6 @@ def compute(
         complete(config.refine, found, tuple(slice(None) for _ in layout.sizes), columns)
         columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
     variables = _variables(config)
-    frame = _frame(config, found)
     data = {
         name: (
             (*config.axes.sizes, *variables[name].dims),
@@ -266,8 +265,7 @@ def compute(
         )
         for name, column in columns.items()
     }
-    # Half the time of `frame.assign(data)`.
-    results = xr.Dataset(data, frame.coords, frame.attrs)
+    results = xr.Dataset(data, *_coordinates_and_attributes(config, found))
     if warn:
         _warn(results, config)
     return results
@@ -357,7 +355,8 @@ def _compute_file(work: _Work, target: Path, checkpoint: Checkpoint) -> None:
 
 def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint, found: Refined | None) -> None:
     """Write the file of a sweep whose cells are all in the checkpoint, but for those that were inferred."""
-    frame = _frame(config, found)
+    coords, attrs = _coordinates_and_attributes(config, found)
+    frame = xr.Dataset(coords=coords, attrs=attrs)
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
     destination = target, checkpoint.working_folder, frame, _variables(config)
     if config.sample is not None:
@@ -610,7 +609,7 @@ class _Tasks:
             self._store.put(positions[order], columns, processor)
 
 
-def _frame(config: Config, found: Refined | None) -> xr.Dataset:
+def _coordinates_and_attributes(config: Config, found: Refined | None) -> tuple[dict[str, Any], dict[str, Any]]:
     """Coordinates and attributes of the dataset of a sweep."""
     coords, attrs = coordinates(config.scene, config.axes.columns), attributes(config)
     if config.sample is not None:
@@ -621,7 +620,7 @@ def _frame(config: Config, found: Refined | None) -> xr.Dataset:
     if config.follow is not None and DIRECTION in config.axes.sizes:
         about = {"long_name": f"direction in which {config.follow.path} is followed"}
         coords[DIRECTION] = DIRECTION, list(BOTH), about
-    return xr.Dataset(coords=coords, attrs=attrs)
+    return coords, attrs
 
 
 def _earlier_sweep(
