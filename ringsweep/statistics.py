@@ -20,9 +20,6 @@ Floats = NDArray[np.float64]
 #: Confidence of all intervals.
 CONFIDENCE = 0.95
 
-#: Order statistics that :func:`summarised` keeps.
-SUMMARY = 256
-
 #: Methods of :func:`unit_points`.
 METHODS = ("sobol", "latin-hypercube", "random")
 
@@ -165,30 +162,6 @@ def saltelli(points: Floats) -> Floats:
     return np.concatenate([a[:, None], mixed, b[:, None]], axis=1)
 
 
-def trajectories(points: Floats) -> Floats:
-    """Morris's design: from each point one parameter after the other moves by half of its distribution.
-
-    The direction is the one that stays within 0 to 1, so a shifted point is drawn like the point itself.
-
-    Parameters
-    ----------
-    points : ndarray of shape ``(count, parameters)``
-
-    Returns
-    -------
-    ndarray of shape ``(count, parameters + 1, parameters)``
-    """
-    rows = np.repeat(points[:, None, :], points.shape[1] + 1, axis=1)
-    moved = np.clip(points + 0.5 * _directions(points), 2.0**-53, 1.0 - 2.0**-53)
-    for k in range(points.shape[1]):
-        rows[:, k + 1 :, k] = moved[:, k, None]
-    return rows
-
-
-def _directions(points: Floats) -> Floats:
-    return np.where(points < 0.5, 1.0, -1.0)
-
-
 # Shares
 
 
@@ -240,36 +213,19 @@ def _student(freedom: float) -> float:
 # Quantiles
 
 
-def summarised(values: Floats) -> Floats:
-    """At most :data:`SUMMARY` order statistics of some numbers, padded with NaN; all numbers if there are not more.
-
-    Each stands for the same number of values, so a share that is read off them errs by half of 1 / :data:`SUMMARY`.
-    """
-    found = np.full(SUMMARY, np.nan)
-    ordered = np.sort(values)
-    if len(ordered) > SUMMARY:
-        ordered = ordered[((np.arange(SUMMARY) + 0.5) * (len(ordered) / SUMMARY)).astype(int)]
-    found[: len(ordered)] = ordered
-    return found
-
-
 def quantiles(
-    summaries: Floats, known: NDArray[Any], size: int, levels: Floats, independent: bool
+    values: Floats, levels: NDArray[Any] | tuple[float, ...], independent: bool
 ) -> tuple[Floats, Floats, Floats]:
-    """Quantiles of a number with 95 % intervals, from summaries of its replicates.
+    """Quantiles of a number with 95 % intervals, from its values in each replicate.
 
     The interval of a quantile holds the numbers x at which the interval of the probability to be at most x holds the
     level. Runs whose number is not known count both ways: as the least and as the greatest number.
 
     Parameters
     ----------
-    summaries : ndarray of shape ``(replicates, SUMMARY)``
-        Of :func:`summarised`. Infinite numbers are allowed.
-    known : ndarray of int, shape ``(replicates,)``
-        Numbers behind each summary.
-    size : int
-        Runs of each replicate.
-    levels : ndarray of shape ``(levels,)``
+    values : ndarray of shape ``(replicates, runs)``
+        NaN is not known; infinite numbers are allowed.
+    levels : sequence of float
     independent : bool
         As for :func:`share_interval`.
 
@@ -278,32 +234,21 @@ def quantiles(
     value, low, high : ndarray of shape ``(levels,)``
         Infinite where the sample does not bound them, and NaN where no number is known.
     """
-    kept = np.minimum(known, summaries.shape[1])
-    if not kept.sum():
+    size, unknown = values.shape[1], np.isnan(values).sum(axis=1)
+    numbers = np.unique(values[~np.isnan(values)])
+    if not len(numbers):
         return np.full(len(levels), np.nan), np.full(len(levels), -np.inf), np.full(len(levels), np.inf)
-    # Rank of each number within each replicate, in runs.
-    numbers = np.unique(summaries[~np.isnan(summaries)])
-    weight = known / np.maximum(kept, 1)
-    ranks = np.stack(
-        [
-            np.searchsorted(row[:k], numbers, side="right") * w
-            for row, k, w in zip(summaries, kept, weight, strict=True)
-        ],
-        axis=-1,
-    )
-    error = np.where(known > summaries.shape[1], 0.5 * known / summaries.shape[1], 0.0)
-    unknown = size - known
-    least = np.clip(np.floor(ranks - error), 0, size)
-    most = np.clip(np.ceil(ranks + error) + unknown, 0, size)
-    below = ranks.sum(axis=-1) / known.sum()
-    floor, _ = share_interval(least, size, independent)
-    _, ceiling = share_interval(most, size, independent)
+    # Runs of each replicate at most at each number; NaN is sorted behind all numbers.
+    ranks = np.stack([np.searchsorted(np.sort(row), numbers, side="right") for row in values], axis=-1)
+    below = ranks.sum(axis=-1) / (values.size - unknown.sum())
+    floor, _ = share_interval(ranks, size, independent)
+    _, ceiling = share_interval(ranks + unknown, size, independent)
     # The probability to lie below all numbers that occur is not 0.
-    _, before = share_interval(unknown[None, :].astype(float), size, independent)
+    _, before = share_interval(unknown[None, :], size, independent)
     value, low, high = (np.empty(len(levels)) for _ in range(3))
     for k, level in enumerate(levels):
         value[k] = numbers[min(np.searchsorted(below, level * (1.0 - 1e-12)), len(numbers) - 1)]
-        low[k] = -np.inf if before[0] >= level else numbers[min(int(np.argmax(ceiling >= level)), len(numbers) - 1)]
+        low[k] = -np.inf if before[0] >= level else numbers[int(np.argmax(ceiling >= level))]
         enough = floor >= level
         high[k] = numbers[int(np.argmax(enough))] if enough.any() else np.inf
     return value, low, high
@@ -363,65 +308,6 @@ def sobol_indices(sums: Floats, size: int) -> tuple[Floats, Floats]:
     high = np.where(known, np.clip(pooled + half, 0.0, 1.0), 1.0)
     first, total = np.moveaxis(np.stack([np.clip(pooled, 0.0, 1.0), low, high]), -1, 0)
     return first, total
-
-
-def morris_sums(rows: Floats, points: Floats) -> Floats:
-    """Sums of elementary effects, from which :func:`morris_effects` follow. Sums of two parts add up.
-
-    Parameters
-    ----------
-    rows : ndarray of shape ``(count, parameters + 1)``
-        Values of a function along :func:`trajectories`.
-    points : ndarray of shape ``(count, parameters)``
-        Points at which they begin.
-
-    Returns
-    -------
-    ndarray of shape ``(3 * parameters,)``
-        For each parameter the sums of the effect, of its magnitude and of its square.
-    """
-    effects = np.diff(rows, axis=1) / (0.5 * _directions(points))
-    return np.stack([effects.sum(axis=0), np.abs(effects).sum(axis=0), (effects**2).sum(axis=0)], axis=-1).ravel()
-
-
-def morris_effects(sums: Floats, size: int, independent: bool, indicator: bool) -> tuple[Floats, Floats]:
-    """Mean magnitude of the elementary effects with its 95 % interval, and their standard deviation.
-
-    M. D. Morris, Technometrics 33, 1991; F. Campolongo, J. Cariboni, A. Saltelli, Environmental Modelling & Software
-    22, 2007. The magnitude of an indicator's effect is 0 or 2: half of its mean has the interval of a share. For other
-    functions the interval comes from the means of the replicates. Effects of a function that is missing (NaN) somewhere
-    are NaN.
-
-    Parameters
-    ----------
-    sums : ndarray of shape ``(..., replicates, 3 * parameters)``
-        Of :func:`morris_sums`.
-    size : int
-        Trajectories of each replicate.
-    independent : bool
-        As for :func:`share_interval`.
-    indicator : bool
-        Whether the function is 0 or 1.
-
-    Returns
-    -------
-    mu_star : ndarray of shape ``(3, ..., parameters)``
-        Mean magnitude, and the ends of its interval, per whole distribution of the parameter.
-    sigma : ndarray of shape ``(..., parameters)``
-    """
-    replicates = sums.shape[-2]
-    count = replicates * size
-    each = sums.reshape(*sums.shape[:-1], -1, 3)
-    total = each.sum(axis=-3)
-    mean, mu_star, square = (total[..., k] / count for k in range(3))
-    variance = square - mean**2
-    # Below this it is rounding.
-    sigma = np.sqrt(np.where(variance <= 1e-12 * square, 0.0, variance) * (count / (count - 1)))
-    if indicator:
-        low, high = share_interval(np.moveaxis(each[..., 1], -2, -1) / 2.0, size, independent)
-        return np.stack([mu_star, 2.0 * low, 2.0 * high]), sigma
-    half = _student(replicates - 1.0) * (each[..., 1] / size).std(axis=-2, ddof=1) / np.sqrt(replicates)
-    return np.stack([mu_star, np.maximum(mu_star - half, 0.0), mu_star + half]), sigma
 
 
 def _variance(sums: Floats, count: int) -> Floats:

@@ -61,8 +61,7 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"method": "halton"}, "sweep.sample.method", "sobol"),
     ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
     ({"keep": 1}, "sweep.sample.keep", "true or false"),
-    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true, false, morris"),
-    ({"sensitivity": "moris"}, "sweep.sample.sensitivity", "did you mean `morris`"),
+    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true, false, or {of: [t_end]} is expected, got 'yes'"),
     ({"of": {}}, "sweep.sample.of", "paths and distributions"),
     *(
         ({"of": {"body.mass": {kind: numbers}}}, f"sweep.sample.of.body.mass.{kind}", "beyond the range of numbers")

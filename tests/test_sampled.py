@@ -19,15 +19,11 @@ from ringsweep.plots import probability_panel, regime_map, sensitivity_panel, su
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.statistics import (
     clopper_pearson,
-    morris_effects,
-    morris_sums,
     quantiles,
     saltelli,
     share_interval,
     sobol_indices,
     sobol_sums,
-    summarised,
-    trajectories,
     unit_points,
 )
 
@@ -135,16 +131,15 @@ def test_quantiles_of_a_normal_number_are_covered() -> None:
     random, levels, covered = np.random.default_rng(3), np.array([0.05, 0.5, 0.9]), np.zeros(3)
     for _ in range(100):
         values = random.normal(size=(8, 400))
-        found = quantiles(np.stack([summarised(row) for row in values]), np.full(8, 400), 400, levels, True)
+        found = quantiles(values, levels, True)
+        assert (found[0] == np.quantile(values, levels, method="inverted_cdf")).all()
         covered += (found[1] <= ndtri(levels)) & (ndtri(levels) <= found[2])
     assert (covered >= 91).all()
 
 
 def test_a_quantile_that_most_runs_do_not_reach_is_infinite() -> None:
     values = np.where(np.arange(80).reshape(8, 10) % 10 < 3, 1.0, np.inf)
-    value, low, high = quantiles(
-        np.stack([summarised(row) for row in values]), np.full(8, 10), 10, np.array([0.1, 0.5]), True
-    )
+    value, low, high = quantiles(values, [0.1, 0.5], True)
     assert value.tolist() == [1.0, np.inf]
     assert high[1] == np.inf
     assert low[0] == 1.0
@@ -193,54 +188,6 @@ def test_indices_agree_with_those_of_salib() -> None:
     # They divide by the variance of all rows.
     assert first[0] == pytest.approx(np.clip(theirs["S1"], 0.0, 1.0), abs=0.02)
     assert total[0] == pytest.approx(theirs["ST"], abs=0.02)
-
-
-def effects(function: Any, dimension: int, size: int, seed: int = 3) -> Any:
-    points = [unit_points("sobol", size, dimension, seed, r) for r in range(8)]
-    return morris_effects(np.stack([morris_sums(function(trajectories(u)), u) for u in points]), size, False, False)
-
-
-def test_effects_of_a_linear_function_are_its_coefficients_and_do_not_vary() -> None:
-    coefficients = np.array([3.0, -2.0, 0.0])
-    mu_star, sigma = effects(lambda u: 5.0 + u @ coefficients, 3, 4)
-    assert mu_star[0] == pytest.approx(np.abs(coefficients), abs=1e-9)
-    assert mu_star[1] == pytest.approx(mu_star[2], abs=1e-9)
-    assert sigma.tolist() == [0.0, 0.0, 0.0]
-
-
-def test_the_effect_of_a_factor_of_a_product_varies_with_the_other() -> None:
-    """The effect of u in u v is v, which is uniform."""
-    mu_star, sigma = effects(lambda u: u[..., 0] * u[..., 1], 2, 1024)
-    assert mu_star[0] == pytest.approx([0.5, 0.5], abs=1e-3)
-    assert sigma == pytest.approx([12.0**-0.5] * 2, abs=1e-3)
-
-
-def test_effects_of_a_function_that_is_missing_somewhere_are_not_known() -> None:
-    mu_star, sigma = effects(lambda u: np.where(u[..., 0] > 0.9, np.nan, u[..., 1]), 2, 16)
-    assert np.isnan(mu_star[:, 0]).all()
-    assert np.isnan(sigma[0])
-
-
-def test_intervals_cover_known_effects() -> None:
-    covered, known = np.zeros(2), np.array([1 / 3, 0.5])
-    for seed in range(100):
-        (_, low, high), _ = effects(lambda u: u[..., 0] * u[..., 1] ** 2, 2, 16, seed)
-        # The effect of v in u v^2 from v to v + 1/2 is u (2 v + 1/2), with v uniform below 1/2.
-        covered += (low <= known) & (known <= high)
-    assert (covered >= 88).all()
-
-
-def test_effects_agree_with_those_of_salib() -> None:
-    morris = pytest.importorskip("SALib.analyze.morris")
-    points = unit_points("random", 64, 3, 1, 0)
-    path = trajectories(points)
-    rows = ishigami(path)
-    mu_star, sigma = morris_effects(np.stack([morris_sums(rows, points)] * 8), 64, True, False)
-    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0, 1]] * 3}
-    theirs = morris.analyze(problem, path.reshape(-1, 3), rows.ravel(), num_levels=4, seed=1)
-    # Their step is 2/3 with four levels; ours is 1/2. One part given eight times counts as 512 trajectories.
-    assert mu_star[0] == pytest.approx(np.asarray(theirs["mu_star"]) * (2 / 3) / 0.5)
-    assert sigma * np.sqrt(511 / 512 * 64 / 63) == pytest.approx(np.asarray(theirs["sigma"]) * (2 / 3) / 0.5)
 
 
 @pytest.mark.parametrize("missing", [False, True])
@@ -303,40 +250,6 @@ def test_indices_of_the_way_of_a_body_that_rides_are_those_of_a_product() -> Non
     assert (ds.sobol_first_high == 1.0).all()
 
 
-def test_effects_on_the_way_of_a_body_that_rides_follow_from_its_velocity() -> None:
-    """x = v T with v uniform and T fixed is linear; the body always rides, so no effect on its regime is seen."""
-    of = {"belt.velocity": {"uniform": [0.05, 0.15]}, "friction.mu_s": {"uniform": [0.3, 0.4]}}
-    scene = {"scene": BELT | {"time": {"span": 4.0}}}
-    ds = run(config(of=of, n=64, sensitivity={"of": ["x_end"], "method": "morris"}) | scene)
-    assert ds.x_end_morris_mu_star.values == pytest.approx([0.4, 0.0], abs=1e-6)
-    assert ds.x_end_morris_sigma.values == pytest.approx([0.0, 0.0], abs=1e-6)
-    assert ds.x_end_morris_mu_star.attrs["units"] == "m"
-    assert (ds.morris_mu_star == 0.0).all()
-    # A share of 64 of which none was seen.
-    assert ((ds.morris_mu_star_high > 0.02) & (ds.morris_mu_star_high < 0.4)).all()
-    assert ds.probability.sel(word="riding") == 1.0
-    assert "64 runs in each cell, and 128 more for the elementary effects" in ds.attrs["sample"]
-
-
-def test_effects_on_a_regime_are_counts_of_runs_that_change_it() -> None:
-    """The body slips within 7 s if mu_s m g <= k v 7 s."""
-    of = {"friction.mu_s": {"uniform": [0.1, 0.2]}, "belt.velocity": {"uniform": [0.08, 0.12]}}
-    scene = {"scene": BELT | {"time": {"span": 7.0}}}
-    ds = run(config(of=of, n=256, sensitivity="morris") | scene)
-    rows = np.concatenate([trajectories(unit_points("sobol", 32, 2, 0, r)) for r in range(8)])
-    rides = (0.1 + 0.1 * rows[..., 0]) * 9.81 > 2.0 * (0.08 + 0.04 * rows[..., 1]) * 7.0
-    changed = (rides[:, 1:] != rides[:, :-1]).mean(axis=0)
-    riding = ds.sel(word="riding")
-    assert riding.morris_mu_star.values == pytest.approx(2.0 * changed)
-    assert (riding.morris_mu_star_low < riding.morris_mu_star).all()
-    assert (riding.morris_mu_star < riding.morris_mu_star_high).all()
-    assert riding.probability == rides[:, 0].mean()
-    from matplotlib.figure import Figure
-
-    bars = sensitivity_panel(ds, Figure().add_subplot(), word="riding")
-    assert bars.get_xlabel() == "elementary effect (95 % interval)"
-
-
 def test_indices_of_a_slip_until_a_time_are_those_of_runs_of_the_same_points() -> None:
     """The body slips by t if mu_s m g <= k v t, so its indicator follows from the points without a run."""
     of = {"friction.mu_s": {"uniform": [0.1, 0.2]}, "belt.velocity": {"uniform": [0.08, 0.12]}}
@@ -368,8 +281,9 @@ def test_probabilities_are_those_of_runs_of_the_same_points() -> None:
         mine = (regimes == k)[:, :, [0, 3]].mean(axis=(1, 2))
         assert ds.probability.sel(word=word).values.tolist() == mine.tolist()
         for cell in range(2):
-            sums = sobol_sums((regimes[cell] == k).astype(float))
-            assert ds.sobol_sums.sel(word=word).values[cell].sum(axis=0).tolist() == sums.tolist()
+            of_parts = (regimes[cell] == k).astype(float).reshape(8, 32, 4)
+            first, _ = sobol_indices(np.stack([sobol_sums(one) for one in of_parts]), 32)
+            assert ds.sobol_first.sel(word=word).values[cell].tolist() == first[0].tolist()
     slip = plain.first_slip.transpose("belt_velocity", "point").values.reshape(2, 256, 4)[:, :, [0, 3]]
     assert ds.survival.values[:, 0].tolist() == (~(slip <= 3.0)).mean(axis=(1, 2)).tolist()
     assert not np.isnan(ds.sobol_first.values).any()
@@ -436,26 +350,6 @@ def test_a_sampled_sweep_that_is_stopped_goes_on_bit_for_bit(tmp_path: Any, monk
         assert (memory[name].values == whole[name].values).all()
 
 
-@pytest.mark.parametrize(
-    ("method", "sensitivity", "rows"), [("sobol", True, 3), ("random", True, 3), ("sobol", "morris", 2)]
-)
-def test_a_larger_sample_continues_a_smaller_one_bit_for_bit(
-    method: str, sensitivity: Any, rows: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from ringsweep.runs import sampled
-
-    given = config(grid={"belt.velocity": [0.05, 0.1]}, sensitivity=sensitivity, survival=[3.0], method=method, n=64)
-    run(given, tmp_path / "few.nc")
-    given["sweep"]["sample"] |= {"n": 256}
-    fresh = run(given, tmp_path / "fresh.nc")
-    cells, compute = [], sampled.compute_task
-    monkeypatch.setattr(sampled, "compute_task", lambda *a: cells.append(len(a[2])) or compute(*a))
-    continued = run(given, tmp_path / "many.nc", reuse=tmp_path / "few.nc")
-    for name in fresh.data_vars:
-        assert_identical(continued[name], fresh[name])
-    assert sum(cells) == 2 * (256 - 64) * rows
-
-
 def test_the_file_does_not_grow_with_the_sample(tmp_path: Any) -> None:
     sizes = []
     for n in (64, 2048):
@@ -484,21 +378,13 @@ def test_runs_that_are_kept_are_those_that_are_counted(tmp_path: Any) -> None:
     assert main(["info", str(tmp_path / "kept.nc")]) == 0
 
 
-def test_what_cannot_be_continued_is_told(tmp_path: Any) -> None:
-    run(config(n=64), tmp_path / "few.nc")
-    for changed, words in (
-        ({"n": 64, "method": "latin-hypercube"}, "Latin hypercube"),
-        ({"quantiles": {"first_slip": [0.5]}}, "quantiles"),
-        ({"sensitivity": {"of": ["x_end"]}}, "order"),
-        ({"seed": 2}, "another sweep"),
-        ({"of": {"friction.mu_s": {"normal": [0.16, 0.01]}}}, "another sweep"),
-        ({"n": 32}, "64 samples"),
-    ):
-        with pytest.raises(InputError, match=words):
-            run(config(**changed), tmp_path / "more.nc", reuse=tmp_path / "few.nc")
-
-
 # Samples that cannot be
+
+
+def test_a_sample_takes_no_cells_of_another(tmp_path: Any) -> None:
+    run(config(n=64), tmp_path / "few.nc")
+    with pytest.raises(InputError, match="--reuse: a sampled sweep has no cells"):
+        run(config(n=256), tmp_path / "many.nc", reuse=tmp_path / "few.nc")
 
 
 def test_a_sample_that_is_not_allowed_is_told_with_its_probability() -> None:

@@ -22,7 +22,7 @@ from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import quantity, show
-from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, trajectories, unit_points
+from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, unit_points
 
 #: Keys of ``sweep.sample`` with a number.
 NUMBERS = {
@@ -33,9 +33,6 @@ NUMBERS = {
 
 #: Keys of ``sweep.sample``.
 KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity", "keep")
-
-#: What `sweep.sample.sensitivity` can ask for; `true` is the first.
-SENSITIVITIES = ("sobol", "morris")
 
 # The least and the greatest share that a point of a sample can have, roughly.
 _FAR = np.array([1e-16, 1.0 - 1e-16])
@@ -107,8 +104,8 @@ class Sample:
         Levels by variable.
     survival : tuple of float
         Times at which it is asked whether the contacts still hold, s.
-    sensitivity : str
-        One of :data:`SENSITIVITIES`, or empty.
+    sensitivity : bool
+        Whether Sobol indices are asked for.
     sensitive : tuple of str
         Variables whose own indices are asked for, beside those of the regimes; for a time that some runs do not have,
         those of whether it has come at the times of `survival`.
@@ -123,7 +120,7 @@ class Sample:
     replicates: int
     quantiles: Mapping[str, tuple[float, ...]]
     survival: tuple[float, ...]
-    sensitivity: str
+    sensitivity: bool
     sensitive: tuple[str, ...]
     keep: bool
 
@@ -135,12 +132,12 @@ class Sample:
     @property
     def rows(self) -> int:
         """Runs for each point."""
-        return len(self.factors) + len(self.own) if self.sensitivity else 1
+        return len(self.factors) + 2 if self.sensitivity else 1
 
     @property
     def own(self) -> list[int]:
         """Which of the runs for each point are points of the sample itself."""
-        return [0, -1] if self.sensitivity == "sobol" else [0]
+        return [0, -1] if self.sensitivity else [0]
 
     @property
     def independent(self) -> bool:
@@ -177,10 +174,9 @@ class Sample:
 
 
 @lru_cache(maxsize=8)
-def _shares(method: str, size: int, factors: int, seed: int, replicate: int, sensitivity: str) -> NDArray[np.float64]:
-    if sensitivity != "sobol":
-        points = unit_points(method, size, factors, seed, replicate)
-        return trajectories(points).reshape(-1, factors) if sensitivity else points
+def _shares(method: str, size: int, factors: int, seed: int, replicate: int, sensitivity: bool) -> NDArray[np.float64]:
+    if not sensitivity:
+        return unit_points(method, size, factors, seed, replicate)
     return saltelli(unit_points(method, size, 2 * factors, seed, replicate)).reshape(-1, factors)
 
 
@@ -389,17 +385,13 @@ def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
     return found
 
 
-def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[str, tuple[str, ...]]:
-    """Which measure is asked for, and of which variables beside the regimes."""
+def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str, ...]]:
+    """Whether Sobol indices are asked for, and of which variables beside the regimes."""
     if isinstance(given, bool):
-        return (SENSITIVITIES[0] if given else ""), ()
-    if given in SENSITIVITIES:
         return given, ()
     where = "sweep.sample.sensitivity"
-    if not isinstance(given, dict) or not {"of"} <= set(given) <= {"of", "method"}:
-        problem = f"true, false, morris, or {{of: [t_end]}} is expected, got {show(given)}"
-        raise InputError(where, problem + (suggestion(given, SENSITIVITIES) if isinstance(given, str) else ""))
-    method = one_of(given.get("method", SENSITIVITIES[0]), SENSITIVITIES, f"{where}.method", "is not a method")
+    if not isinstance(given, dict) or set(given) != {"of"}:
+        raise InputError(where, f"true, false, or {{of: [t_end]}} is expected, got {show(given)}")
     if not isinstance(given["of"], list) or not given["of"]:
         raise InputError(f"{where}.of", f"a list of variables is expected, got {show(given['of'])}")
     time = censored(scene)
@@ -409,7 +401,7 @@ def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[str, tuple[str,
             problem = f"{time} is missing in runs in which it does not happen: say at which times, by survival: [1 s]"
             raise InputError(f"{where}.of.{k}", problem)
         one_of(name, names, f"{where}.of.{k}", "is no number of this model")
-    return method, tuple(dict.fromkeys(given["of"]))
+    return True, tuple(dict.fromkeys(given["of"]))
 
 
 def _survival(given: Any, scene: Scene) -> tuple[float, ...]:

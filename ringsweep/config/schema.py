@@ -15,7 +15,6 @@ from ringsweep.config.own import FORMULA, TABLE_LAW
 from ringsweep.config.record import INSTANTS, KEEP, PERIOD
 from ringsweep.config.refine import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
-from ringsweep.config.sampling import SENSITIVITIES
 from ringsweep.config.tables import INTERPOLATIONS, TABLES
 from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Structure
@@ -246,7 +245,6 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
     kinds["file"] = _text("CSV file with a column for each path; a row is a draw")
     kinds["over"] = _text("path that the draw is multiplied by")
     drawn = "path -> distribution; paths with commas between them are drawn together"
-    measure = {"enum": [*SENSITIVITIES]}
     found = _section(
         {
             **{key: _number(parameter) for key, parameter in SAMPLE_NUMBERS.items()},
@@ -255,8 +253,8 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
             "quantiles": _open("variable -> levels", _list(_VALUE)),
             "survival": {"description": "times at which it is asked whether the contacts still hold", **axis},
             "sensitivity": {
-                "description": "Sobol indices (true) or Morris's effects, and of which variables beside the regimes",
-                "anyOf": [_FLAG, measure, _section({"of": _list(_TEXT), "method": measure}, "of")],
+                "description": "Sobol indices, and of which variables beside the regimes",
+                "anyOf": [_FLAG, _section({"of": _list(_TEXT)}, "of")],
             },
             "keep": {"description": "whether the result holds the runs too", **_FLAG},
         },

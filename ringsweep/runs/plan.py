@@ -240,7 +240,7 @@ def _measure(config: Config, layout: Layout) -> tuple[list[TaskResult] | None, f
             # A cell that starts from another one costs about as much.
             results.append(compute_task(replace(config, follow=None), layout, positions))
         else:
-            results.append(sampled.compute_parts(config, layout, None, positions))
+            results.append(sampled.compute_parts(config, layout, positions))
 
     def work() -> None:
         try:

@@ -1,16 +1,14 @@
 """Sampled sweeps: runs at the points of a sample are reduced to sums, and sums to probabilities.
 
-A part of a cell is what one replicate of the sample adds to it. A task runs some parts, and keeps of each only sums,
-whose size does not depend on the number of runs. They are whole numbers, so their order does not matter.
+A part of a cell is what one replicate of the sample adds to it. A task runs some parts, and keeps sums of each, whose
+size does not depend on the number of runs, and the numbers whose quantiles are asked for.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import os
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,20 +23,9 @@ from ringsweep.models import model_of
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.variables import QUANTILE_ENDS, SAMPLED, Variable
 from ringsweep.runs.cells import TaskResult, compute_task
-from ringsweep.statistics import (
-    CONFIDENCE,
-    SUMMARY,
-    morris_effects,
-    morris_sums,
-    quantiles,
-    share_interval,
-    sobol_indices,
-    sobol_sums,
-    summarised,
-)
-from ringsweep.storage import netcdf
+from ringsweep.statistics import CONFIDENCE, quantiles, share_interval, sobol_indices, sobol_sums
 from ringsweep.storage.chunks import CHUNK, Layout, chunk_shape
-from ringsweep.storage.provenance import differences, environment, fingerprint, identity, processor
+from ringsweep.storage.provenance import environment, processor
 
 Columns = dict[str, NDArray[Any]]
 
@@ -79,88 +66,25 @@ def _sums_of(sample: Sample) -> dict[str, tuple[str, tuple[int, ...]]]:
     if sample.survival:
         found["lost"] = "int32", (len(sample.survival), 2)
     for name in sample.quantiles:
-        found[f"{name}_known"] = "int32", ()
-        found[f"{name}_summary"] = "float64", (SUMMARY,)
+        found[f"{name}_values"] = "float64", (sample.size * len(sample.own),)
     if sample.sensitivity:
-        kind = f"{sample.sensitivity}_sums"
-        each = 3 * (len(sample.factors) + (sample.sensitivity == "sobol"))
-        found[kind] = "float64", (len(REGIMES), each)
+        each = 3 * (len(sample.factors) + 1)
+        found["sobol_sums"] = "float64", (len(REGIMES), each)
         for name in sample.sensitive:
-            found[f"{name}_{kind}"] = "float64", (*([len(sample.survival)] if name in CENSORED else []), each)
+            found[f"{name}_sobol_sums"] = "float64", (*([len(sample.survival)] if name in CENSORED else []), each)
     return found
 
 
-class EarlierSample:
-    """File of the same sampled sweep with fewer points, which are the first ones of a larger one.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    config : Config
-        The new sweep.
-
-    Raises
-    ------
-    InputError
-        If the file holds no such sweep, or the points or sums of the new one do not continue its own.
-
-    Attributes
-    ----------
-    size : int
-        Points of each replicate.
-    processors : str
-        Names of the processors that computed the file.
-    """
-
-    def __init__(self, path: str | os.PathLike[str], config: Config):
-        new = _sample(config)
-        if new.method == "latin-hypercube":
-            raise InputError("--reuse", "the points of a larger Latin hypercube are others: use sobol or random")
-        if new.sensitive:
-            raise InputError("--reuse", "sums of numbers depend on their order: leave sensitivity.of out")
-        if new.quantiles or new.keep:
-            key = "keep" if new.keep else "quantiles"
-            raise InputError("--reuse", f"a file does not hold what {key} needs of each run: leave {key} out")
-        netcdf.check(path)
-        with netcdf.reading(path) as ds:
-            if "runs" not in ds or "probability" not in ds:
-                raise InputError(str(path), "holds no sampled sweep that could go on")
-            earlier = load(path)
-            old = _sample(earlier)
-            if ds.attrs.get("fingerprint") != fingerprint(identity(earlier)):
-                raise InputError(str(path), "was computed by another version: it cannot go on")
-            same, changed = replace(earlier, sample=replace(old, n=new.n)), identity(config)
-            if changes := differences(identity(same), changed):
-                raise InputError(str(path), f"is another sweep: {changes}")
-            if old.n > new.n:
-                raise InputError(str(path), f"has {old.n} samples in each cell already, and {new.n} are asked for")
-            self.size, self.processors = old.size, str(ds.attrs.get("processors"))
-            self._sums = {name: ds[name].values for name in _sums_of(new)}
-
-    def sums(self, layout: Layout, positions: NDArray[np.integer]) -> Columns:
-        """The sums of some parts."""
-        place = layout.indices(positions)
-        return {name: column[place] for name, column in self._sums.items()}
-
-
-def compute_parts(
-    config: Config, layout: Layout, earlier: EarlierSample | None, positions: NDArray[np.integer]
-) -> TaskResult:
-    """Run the parts at some positions of the layout of parts, and reduce each to its sums.
-
-    Those of an earlier sweep are added, and its points are not run again.
-    """
+def compute_parts(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
+    """Run the parts at some positions of the layout of parts, and reduce each to its sums."""
     sample = _sample(config)
     cells, replicates = np.divmod(positions, sample.replicates)
     sums = {name: np.zeros((len(positions), *shape), dtype=dtype) for name, (dtype, shape) in _sums_of(sample).items()}
     seconds: float | None = 0.0
     grid = Layout(layout.sizes[:-1], layout.chunk[:-1])
-    first = 0 if earlier is None else earlier.size
     for replicate in np.unique(replicates).tolist():
-        shares = sample.shares(replicate)[first * sample.rows :]
-        if not (runs := len(shares)):
-            continue
+        shares = sample.shares(replicate)
+        runs = len(shares)
         axes = sample.axes(config.scene, config.axes, shares)
         one = replace(config, axes=axes, sample=None)
         # A cell and its runs stand together, so a run has the position of its cell times their number.
@@ -184,15 +108,10 @@ def compute_parts(
                     sums.setdefault(name, np.empty((len(positions), runs), dtype=column.dtype))[some] = column
             for k, part in enumerate(some.tolist()):
                 of_run = {name: column[k] for name, column in columns.items()}
-                of_part = _reduce(sample, censored(config.scene), of_run, shares)
+                of_part = _reduce(sample, censored(config.scene), of_run)
                 for name, value in of_part.items():
                     sums[name][part] = value
-    processors = {processor()}
-    if earlier is not None:
-        processors |= set(earlier.processors.split(", "))
-        for name, before in earlier.sums(layout, positions).items():
-            sums[name] += before
-    return TaskResult(positions, sums, seconds, environment(), ", ".join(sorted(processors)))
+    return TaskResult(positions, sums, seconds, environment(), processor())
 
 
 def _needed(config: Config) -> list[str]:
@@ -202,7 +121,7 @@ def _needed(config: Config) -> list[str]:
     return list(dict.fromkeys(["regime", "certified", *times, *sample.quantiles, *sample.sensitive]))
 
 
-def _reduce(sample: Sample, time: str, columns: Columns, shares: NDArray[np.float64]) -> Columns:
+def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
     """The sums of one part, from the outcomes of its runs; `time` is the variable of survival."""
     # A row for each point.
     rows = {name: column.reshape(-1, sample.rows) for name, column in columns.items()}
@@ -214,19 +133,17 @@ def _reduce(sample: Sample, time: str, columns: Columns, shares: NDArray[np.floa
         lost = points[time][:, None] <= np.array(sample.survival)
         found["lost"] = np.stack([lost[~sure].sum(axis=0), lost[sure].sum(axis=0)], axis=-1)
     for name in sample.quantiles:
-        values = points[name][sure]
-        found[f"{name}_known"] = np.array(len(values))
-        # What did not happen within the span happens later, if ever.
-        found[f"{name}_summary"] = summarised(np.where(np.isnan(values), np.inf, values))
+        # What did not happen within the span happens later, if ever; without a certificate nothing is known.
+        happened = np.where(np.isnan(points[name]), np.inf, points[name])
+        found[f"{name}_values"] = np.where(sure, happened, np.nan)
     if sample.sensitivity:
-        kind = f"{sample.sensitivity}_sums"
-        reduced = sobol_sums if sample.sensitivity == "sobol" else partial(morris_sums, points=shares[:: sample.rows])
-        found[kind] = np.stack([reduced((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))])
+        each = [sobol_sums((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))]
+        found["sobol_sums"] = np.stack(each)
         for name in sample.sensitive:
             # A time that has not come is not a number, and compares as later.
             functions = [rows[name] <= t for t in sample.survival] if name in CENSORED else [rows[name]]
-            each = [reduced(function.astype(float)) for function in functions]
-            found[f"{name}_{kind}"] = np.stack(each) if name in CENSORED else each[0]
+            each = [sobol_sums(function.astype(float)) for function in functions]
+            found[f"{name}_sobol_sums"] = np.stack(each) if name in CENSORED else each[0]
     return found
 
 
@@ -254,34 +171,20 @@ def statistics(config: Config, sums: Columns) -> Columns:
     without = np.subtract(*share_interval(reported, size, sample.independent)[::-1])
     found["probability_numerics"] = np.maximum(high - low - without, 0.0)
     if sample.survival:
-        found["lost"] = flat["lost"]
         lost = np.moveaxis(flat["lost"], 1, -1)
         held, certain = size - lost.sum(axis=2), size - unsure[:, None] - lost[:, :, 1]
         found["survival"] = held.sum(axis=-1) / total
         _both_ways(found, "survival", certain, unsure[:, None], size, sample)
     for name, levels in sample.quantiles.items():
-        rows = [
-            quantiles(summary, known, size, np.array(levels), sample.independent)
-            for summary, known in zip(flat[f"{name}_summary"], flat[f"{name}_known"], strict=True)
-        ]
+        rows = [quantiles(values, levels, sample.independent) for values in flat[f"{name}_values"]]
         place = np.searchsorted(_levels(sample), levels)
         for k, end in enumerate(("", "_low", "_high")):
             column = found[f"{name}_quantile{end}"] = np.full((len(rows), len(_levels(sample))), np.nan)
             column[:, place] = [row[k] for row in rows]
     if sample.sensitivity:
         for prefix in ("", *(f"{name}_" for name in sample.sensitive)):
-            kind = f"{prefix}{sample.sensitivity}_sums"
-            together = found[kind] = flat[kind]
-            each = np.moveaxis(together, 1, -2)
-            if sample.sensitivity == "sobol":
-                indices = dict(zip(("sobol_first", "sobol_total"), sobol_indices(each, sample.size), strict=True))
-            else:
-                indicator = prefix.removesuffix("_") in ("", *CENSORED)
-                mu_star, found[f"{prefix}morris_sigma"] = morris_effects(
-                    each, sample.size, sample.independent, indicator
-                )
-                indices = {"morris_mu_star": mu_star}
-            for name, index in indices.items():
+            together = np.moveaxis(flat[f"{prefix}sobol_sums"], 1, -2)
+            for name, index in zip(("sobol_first", "sobol_total"), sobol_indices(together, sample.size), strict=True):
                 found |= {f"{prefix}{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
     found |= {name: column for name, column in flat.items() if name not in _sums_of(sample)}
     return {name: column.reshape((*shape, *column.shape[1:])) for name, column in found.items()}
@@ -331,7 +234,6 @@ def variables(config: Config) -> dict[str, Variable]:
     found = {"runs": replace(SAMPLED["runs"], dims=("replicate", "word", "certificate"))}
     found |= _beginning_with("probability", ("word",))
     if sample.survival:
-        found["lost"] = replace(SAMPLED["lost"], dims=("replicate", "survival_time", "certificate"))
         found |= _beginning_with("survival", ("survival_time",))
     known = model_of(config.scene.structure).variables
     for name in sample.quantiles:
@@ -339,18 +241,14 @@ def variables(config: Config) -> dict[str, Variable]:
             about = f"{of}: {known[name].long_name}"
             found[f"{name}_quantile{end}"] = Variable(known[name].unit, about, dims=("quantile",))
     if sample.sensitivity:
-        kind = f"{sample.sensitivity}_sums"
-        measures = _beginning_with(f"{sample.sensitivity}_", ("word", "parameter"))
-        sums = replace(measures.pop(kind), dims=("replicate", "word", "sum"))
-        found |= {kind: sums, **measures}
+        measures = _beginning_with("sobol_", ("word", "parameter"))
+        found |= measures
         for number in sample.sensitive:
             about = known[number].long_name
             times = ("survival_time",) if number in CENSORED else ()
-            found[f"{number}_{kind}"] = replace(sums, dims=("replicate", *times, "sum"))
-            unit = "1" if sample.sensitivity == "sobol" or number in CENSORED else known[number].unit
             for name, one in measures.items():
                 text = one.long_name.replace("the indicator of each regime", about)
-                found[f"{number}_{name}"] = Variable(unit, text, dims=(*times, "parameter"))
+                found[f"{number}_{name}"] = Variable("1", text, dims=(*times, "parameter"))
     if sample.keep:
         found |= {name: replace(one, dims=("replicate", "sample")) for name, one in known.items() if name not in found}
     return found
@@ -366,8 +264,7 @@ def attributes(config: Config) -> dict[str, Any]:
     sample = _sample(config)
     way = "Clopper and Pearson" if sample.independent else "scatter of the replicates (Korn and Graubard)"
     points = f"{sample.n * len(sample.own)} runs"
-    measure = "indices" if sample.sensitivity == "sobol" else "elementary effects"
-    rest = f", and {sample.n * len(sample.factors)} more for the {measure}" if sample.sensitivity else ""
+    rest = f", and {sample.n * len(sample.factors)} more for the indices" if sample.sensitivity else ""
     return {
         "sample": f"{points} in each cell{rest}: {sample.method}, seed {sample.seed}, {sample.replicates} replicates; "
         + "; ".join(f"{factor.name} {factor}" for factor in sample.factors),

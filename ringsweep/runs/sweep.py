@@ -32,7 +32,6 @@ from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
 from ringsweep.runs.refined import attributes as refinement_attributes
 from ringsweep.runs.refinement import Refined
 from ringsweep.runs.reuse import EarlierSweep
-from ringsweep.runs.sampled import EarlierSample
 from ringsweep.runs.task_sizes import TaskSizes, chains_of, divide_into_tasks
 from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
@@ -445,15 +444,15 @@ class _Work:
     layout : Layout
         Order of the cells, or of the parts of the cells of a sampled sweep.
     store : Checkpoint or MemoryStore
-    earlier : EarlierSweep or EarlierSample, optional
-        Sweep whose cells are taken, or sampled sweep with fewer points that goes on.
+    earlier : EarlierSweep, optional
+        Sweep whose cells are taken.
     execution : Execution
     """
 
     config: Config
     layout: Layout
     store: Checkpoint | MemoryStore
-    earlier: EarlierSweep | EarlierSample | None
+    earlier: EarlierSweep | None
     execution: Execution
 
     def compute(self) -> Refined | None:
@@ -478,7 +477,7 @@ class _Work:
         for positions, columns in self.store.finished():
             labels.put(positions, dict(columns))
         # Which cells an earlier sweep must give is known at the end: until then its labels are enough.
-        if isinstance(self.earlier, EarlierSweep):
+        if self.earlier is not None:
             for positions, columns in self.earlier.shared_cells(self.config, self.layout, labels.known, labels.names):
                 labels.put(positions, columns)
         with self._open_tasks(None) as tasks:
@@ -498,7 +497,7 @@ class _Work:
 
     def _take_shared(self, done: NDArray[np.bool_]) -> None:
         """Take the cells that are not done from the earlier sweep, as far as there is one that has them."""
-        if not isinstance(self.earlier, EarlierSweep):
+        if self.earlier is None:
             return
         taken = 0
         for positions, columns in self.earlier.shared_cells(self.config, self.layout, done):
@@ -527,8 +526,7 @@ class _Work:
                 sent = replace(config, source={})
                 task: Callable[..., TaskResult] = partial(compute_task, sent, self.layout)
                 if config.sample is not None:
-                    goes_on = self.earlier if isinstance(self.earlier, EarlierSample) else None
-                    task = partial(sampled.compute_parts, sent, self.layout, goes_on)
+                    task = partial(sampled.compute_parts, sent, self.layout)
                 tasks = _Tasks(task, store, workers, sizes, stopped, bar)
                 try:
                     yield tasks
@@ -623,15 +621,13 @@ def _coordinates_and_attributes(config: Config, found: Refined | None) -> tuple[
     return coords, attrs
 
 
-def _earlier_sweep(
-    config: Config, reuse: str | os.PathLike[str] | None
-) -> tuple[Config, EarlierSweep | EarlierSample | None]:
+def _earlier_sweep(config: Config, reuse: str | os.PathLike[str] | None) -> tuple[Config, EarlierSweep | None]:
     """The configuration, with its axes aligned to those of the earlier sweep, and that sweep."""
     if reuse is None:
         return config, None
     if config.follow is not None:
         raise InputError("--reuse", "cells of sweep.follow start from the cells before them: leave one of them out")
     if config.sample is not None:
-        return config, sampled.EarlierSample(reuse, config)
+        raise InputError("--reuse", "a sampled sweep has no cells that another one could take: leave it out")
     earlier = EarlierSweep(reuse, config)
     return earlier.align_axes(config), earlier

@@ -23,7 +23,7 @@ from ringsweep.runs.boundaries import bisect, located, run_points, word_in
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
-from ringsweep.statistics import quantiles, summarised
+from ringsweep.statistics import quantiles
 from ringsweep.storage.provenance import attributes
 
 #: Levels of the quantiles of a threshold.
@@ -186,7 +186,7 @@ def distribution(
         If the sweep has other axes, or a number of the sample is a ratio to the one that varies.
     """
     assert config.sample is not None
-    sample = replace(config.sample, sensitivity="", sensitive=(), keep=False, quantiles={}, survival=())
+    sample = replace(config.sample, sensitivity=False, sensitive=(), keep=False, quantiles={}, survival=())
     if others := [name for name in config.axes.columns if name != path]:
         raise InputError("sweep", f"also varies {', '.join(others)}, but a threshold is that of one cell: leave it out")
     for factor in sample.factors:
@@ -222,9 +222,7 @@ def distribution(
 
     bisect(ends, tolerance, run, inner)
     found = np.where(known, np.where(inner, 0.5 * (ends[0] + ends[1]), found), np.nan).reshape(sample.replicates, size)
-    told = known.reshape(found.shape)
-    summaries = np.stack([summarised(row[own]) for row, own in zip(found, told, strict=True)])
-    columns = quantiles(summaries, told.sum(axis=1), size, np.array(LEVELS), sample.independent)
+    columns = quantiles(found, LEVELS, sample.independent)
     parameter = sweepable(config.scene)[path]
     about = parameter.attributes
     return xr.Dataset(
