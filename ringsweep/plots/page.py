@@ -97,7 +97,7 @@ def save_page(
 
     sweep = _Sweep.of(ds, x, y, var, sel or {})
     with replacing(path) as temporary:
-        page = file_html(_document(sweep), INLINE, sweep.title).replace("<head>", f"<head>\n    {_VIEWPORT}", 1)
+        page = file_html(_document(sweep), INLINE, _title(ds)).replace("<head>", f"<head>\n    {_VIEWPORT}", 1)
         Path(temporary).write_text(page, encoding="utf-8")
 
 
@@ -120,54 +120,31 @@ def check_page(path: str | os.PathLike[str]) -> None:
 
 @dataclass(frozen=True)
 class _Sweep:
-    """What a page shows, as plain numbers and texts.
+    """What a page shows. Its dimensions are in the order of the page: those of the slices, then those of the axes.
 
     A view shows a slice of the cells: all along the axes, at one value along each further dimension.
 
     Attributes
     ----------
-    title : str
-    notes : list of str
-        What is held, how many cells are drawn, and what the audit of a refined sweep says.
+    ds, whole : xarray.Dataset
+        The cells that are shown, and all cells of the file.
     var : str
         Variable that is shown first.
+    notes : list of str
+        What is held, how many cells are shown, and what the audit of a refined sweep says.
     horizontal, vertical : Axis
         `vertical` is None if one quantity was swept.
-    x, y : ndarray of shape ``(size,)``
-        Positions of the cells of a slice, where these are points.
-    scattered : bool
-        Whether the cells are points; else they are those of a grid.
-    size : int
-        Number of cells of a slice.
-    cells : dict of str to ndarray
-        Values of each variable: of a classification the positions among `words`, or -1, shape ``(slices * size,)``; of
-        others see :func:`_packed`.
-    variables : dict of str to dict
-        ``title``, the name; ``label``, the name with unit; ``words`` of a classification, and ``shares`` of the cells
-        of the file in each slice that have them; ``error``, the variable that bounds the error; ``logarithmic``,
-        whether its colours are.
-    scales : dict of str to tuple
-        Colours of each variable, and the least and the greatest number.
-    coordinates : list of dict
-        ``texts``, the values of a coordinate with its name; ``along``, stride and size of each of its dimensions.
-    slices : list of list of str
-        Values along each further dimension.
+    slices : list of str
+        Dimensions of the slices.
     """
 
-    title: str
-    notes: list[str]
+    ds: xr.Dataset
+    whole: xr.Dataset
     var: str
+    notes: list[str]
     horizontal: Axis
     vertical: Axis | None
-    x: NDArray[Any]
-    y: NDArray[Any]
-    scattered: bool
-    size: int
-    cells: dict[str, NDArray[Any]]
-    variables: dict[str, dict[str, Any]]
-    scales: dict[str, tuple[list[str], float, float]]
-    coordinates: list[dict[str, Any]]
-    slices: list[list[str]]
+    slices: list[str]
 
     @classmethod
     def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> _Sweep:
@@ -179,55 +156,37 @@ class _Sweep:
         var = resolve("var", var, numeric_names(ds))
         ds, held, horizontal, vertical = choose_axes(ds, var, sel, x, y)
         notes = [*held, *audit_texts(ds)]
-        scattered = vertical is not None and is_scattered(horizontal, vertical)
         axes = [axis for axis in (vertical, horizontal) if axis]
         whole = ds
-        if not scattered:
+        if not (vertical and is_scattered(horizontal, vertical)):
             # A picture of cells needs their values in ascending order.
             ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG, ds[var]))
             if ds[var].size < whole[var].size:
                 notes.append(f"1 cell in {whole[var].size / ds[var].size:.0f} shown; shares are those of all cells")
             axes = [replace(Axis.of(ds[axis.name], ds), scale=axis.scale) for axis in axes]
-            *_, horizontal = axes
-            vertical = axes[0] if vertical else None
         dims = list(dict.fromkeys(dim for axis in axes for dim in axis.dims))
-        others = [str(dim) for dim in ds[var].dims if dim not in dims]
-        template = ds[var].transpose(*others, *dims)
-        if template.size > _MOST_CELLS:
-            left = ", ".join(f"{dim} ({size})" for dim, size in template.sizes.items())
+        slices = [str(dim) for dim in ds[var].dims if dim not in dims]
+        ds, whole = (one.transpose(*slices, *dims, ...) for one in (ds, whole))
+        if ds[var].size > _MOST_CELLS:
+            left = ", ".join(f"{dim} ({size})" for dim, size in ds[var].sizes.items())
             raise InputError("sel", f"{left} are more than {_MOST_CELLS:,} cells: hold some of these: --sel DIM=VALUE")
-        cells, variables, scales = {}, {}, {}
-        for name in numeric_names(ds):
-            data = ds[name]
-            if set(data.dims) != set(template.dims):
-                continue
-            every = whole[name].transpose(*template.dims)
-            cells[name], variables[name], scales[name] = _column(data.transpose(*template.dims), ds, every, len(others))
-        points = template[dict.fromkeys(others, 0)]
-        return cls(
-            str(ds.attrs.get("title", "ringsweep")),
-            [plain_text(note) for note in notes],
-            var,
-            horizontal,
-            vertical,
-            horizontal.values_at(points),
-            vertical.values_at(points) if vertical else np.zeros(points.size),
-            scattered,
-            points.size,
-            cells,
-            variables,
-            scales,
-            [_coordinate(c, template) for c in swept(ds) or template.coords.values() if c.dims],
-            [[_slice_text(ds, dim, k) for k in range(ds.sizes[dim])] for dim in others],
-        )
+        return cls(ds, whole, var, notes, axes[-1], axes[0] if vertical else None, slices)
+
+    @property
+    def points(self) -> xr.DataArray | None:
+        """The cells of a slice, if they are points; None if they are those of a grid."""
+        if self.vertical is None or not is_scattered(self.horizontal, self.vertical):
+            return None
+        return self.ds[self.var][dict.fromkeys(self.slices, 0)]
 
 
 def _column(
     data: xr.DataArray, ds: xr.Dataset, every: xr.DataArray, others: int
 ) -> tuple[NDArray[Any], dict[str, Any], tuple[Any, ...]]:
-    """Values of a variable in compact form, what a page says of it, and its colours.
+    """Values of a variable in compact form, what a page says of it, and its colours with their ends.
 
-    `every` has the cells that are not shown too; the first `others` of its dimensions are those of the slices.
+    `every` has the cells that are not shown too; the first `others` of its dimensions are those of the slices. The
+    values of a classification are the positions among its words, or -1; of others see :func:`_packed`.
     """
     data = displayed(data)
     scale = ColourScale.of(data)
@@ -293,20 +252,63 @@ def _document(sweep: _Sweep) -> Any:
     from bokeh.document import Document
     from bokeh.events import DocumentReady
     from bokeh.layouts import column, row
+
+    ds, template = sweep.ds, sweep.ds[sweep.var]
+    columns = {
+        name: _column(ds[name], ds, sweep.whole[name], len(sweep.slices))
+        for name in numeric_names(ds)
+        if set(ds[name].dims) == set(template.dims)
+    }
+    variables = {name: about for name, (_, about, _) in columns.items()}
+    plot = _plot(sweep.horizontal, sweep.vertical)
+    bars = {name: _colour_bars(plot, about, colours) for name, (_, about, colours) in columns.items()}
+    paint = models.LinearColorMapper(palette=[look.NO_VALUE], nan_color=look.NO_VALUE)
+    shown = _points(plot, sweep, paint) if sweep.points is not None else _cells(plot, sweep, paint)
+    choice = {"stylesheets": [models.InlineStyleSheet(css=_DARK)], "sizing_mode": "stretch_width"}
+    names = [(name, about["title"]) for name, about in variables.items()]
+    variable = models.Select(title="variable", value=sweep.var, options=names, **choice)
+    slices = []
+    for dim in sweep.slices:
+        options = [(str(k), _slice_text(ds, dim, k)) for k in range(ds.sizes[dim])]
+        slices.append(models.Select(title="slice", value="0", options=options, **choice))
+    coordinates = [_coordinate(c, template) for c in swept(ds) or template.coords.values() if c.dims]
+    cells = {name: values for name, (values, _, _) in columns.items()}
+    known = {"plot": plot, "paint": paint, "bars": bars, "axes": [*plot.xaxis, *plot.yaxis], "variable": variable}
+    known |= {"slices": slices, "cells": cells, "variables": variables, "coordinates": coordinates}
+    code = (files("ringsweep.plots") / "page.js").read_text(encoding="utf-8")
+    show = models.CustomJS(args=known | shown, code=code)
+    for chooser in (variable, *slices):
+        chooser.js_on_change("value", show)
+    tell = models.CustomJSHover(code="return ringsweep_tell(special_vars)")
+    for renderer in (shown["drawn"], *shown["curve"][-1:]):
+        # Over a line, wherever the pointer is, the nearest cell tells its numbers.
+        how = {"mode": "vline" if renderer in shown["curve"] else "mouse", "limit": 1}
+        plot.add_tools(models.HoverTool(tooltips=_TOOLTIP, formatters={"@{value}": tell}, renderers=[renderer], **how))
+    document = Document()
+    heading = "; ".join([_title(ds), *map(plain_text, sweep.notes)])
+    notes = models.Div(text=heading, render_as_text=True, sizing_mode="stretch_width")
+    choosers = row(variable, *slices, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
+    document.add_root(column(notes, choosers, plot, sizing_mode="stretch_both"))
+    document.js_on_event(DocumentReady, show)
+    return document
+
+
+def _title(ds: xr.Dataset) -> str:
+    return str(ds.attrs.get("title", "ringsweep"))
+
+
+def _plot(horizontal: Axis, vertical: Axis | None) -> Any:
+    """An empty plot with its axes."""
+    from bokeh import models
     from bokeh.plotting import figure
 
-    horizontal, vertical = sweep.horizontal, sweep.vertical
-    plot = figure(
-        x_axis_type=horizontal.scale,
-        y_axis_type=vertical.scale if vertical else "linear",
-        x_axis_label=plain_text(horizontal.label),
-        y_axis_label=plain_text(vertical.label) if vertical else "",
-        tools="pan,wheel_zoom,box_zoom,reset,save",
-        active_scroll="wheel_zoom",
-        sizing_mode="stretch_both",
-        min_height=360,
-        outline_line_color=None,
-    )
+    scales = {"x_axis_type": horizontal.scale, "y_axis_type": vertical.scale if vertical else "linear"}
+    names = {
+        "x_axis_label": plain_text(horizontal.label),
+        "y_axis_label": plain_text(vertical.label if vertical else ""),
+    }
+    tools = {"tools": "pan,wheel_zoom,box_zoom,reset,save", "active_scroll": "wheel_zoom"}
+    plot = figure(**scales, **names, **tools, sizing_mode="stretch_both", min_height=360, outline_line_color=None)
     plot.grid.visible = False
     plot.toolbar.logo = None
     plot.axis.axis_label_text_font_style = "normal"
@@ -320,91 +322,70 @@ def _document(sweep: _Sweep) -> Any:
         if axis and axis.names:
             drawn.ticker = models.FixedTicker(ticks=list(range(len(axis.names))))
             drawn.major_label_overrides = dict(enumerate(axis.names))
-    bars = {}
-    for name, about in sweep.variables.items():
-        colours, low, high = sweep.scales[name]
-        kind = models.LogColorMapper if about["logarithmic"] else models.LinearColorMapper
-        ticker = (
-            {} if about["words"] is None else {"ticker": models.FixedTicker(ticks=list(range(len(about["words"]))))}
-        )
-        # Numbers of a page are rounded: the least one must not fall below the scale, where only zeros are.
-        zeros = {"low": 0.99 * low, "low_color": ZERO} if about["logarithmic"] else {"low": low}
-        mapper = kind(palette=colours, high=high, **zeros)
-        style = {"color_mapper": mapper, "visible": False, **ticker}
-        bars[name] = [models.ColorBar(**style, major_label_text_font_size=f"{size}px") for size in (12, 11)]
-        for bar, side in zip(bars[name], ("right", "below"), strict=True):
-            plot.add_layout(bar, side)
-    paint = models.LinearColorMapper(palette=[look.NO_VALUE], nan_color=look.NO_VALUE)
-    line, curve = None, []
-    if sweep.scattered:
-        columns, rows = np.arange(sweep.size), np.zeros(1, dtype=np.intp)
-        view = models.ColumnDataSource({"x": sweep.x, "y": sweep.y, "value": np.zeros(sweep.size, dtype=np.float32)})
-        size = float(np.clip(300 / math.sqrt(sweep.size), 5, 14))
-        drawn = plot.scatter(
-            "x", "y", size=size, line_color=None, fill_color={"field": "value", "transform": paint}, source=view
-        )
-        doubtful = models.ColumnDataSource({"x": [], "y": []})
-        plot.scatter("x", "y", marker="x", size=0.6 * size, line_color="black", source=doubtful)
-        edges = None
-    else:
-        edges = [horizontal.edges, vertical.edges if vertical else np.array([0.0, 1.0])]
-        columns, rows = (
-            _cells_of_pixels(e, a.scale if a else "linear") for e, a in zip(edges, (horizontal, vertical), strict=True)
-        )
-        view = models.ColumnDataSource({"value": [np.zeros((len(rows), len(columns)), dtype=np.float32)]})
-        (left, right), (bottom, top) = ((float(e[0]), float(e[-1])) for e in edges)
-        plot.x_range, plot.y_range = models.Range1d(left, right), models.Range1d(bottom, top)
-        drawn = plot.image("value", x=left, y=bottom, dw=right - left, dh=top - bottom, source=view, color_mapper=paint)
-        doubtful = models.ColumnDataSource({"left": [], "right": [], "bottom": [], "top": []})
-        style = {"fill_color": None, "line_color": None, "hatch_pattern": "/", "hatch_scale": 8, "hatch_weight": 0.5}
-        plot.quad("left", "right", "bottom", "top", source=doubtful, **style)
-        if vertical is None:
-            line = models.ColumnDataSource({"x": horizontal.values, "value": np.zeros(sweep.size, dtype=np.float32)})
-            style = {"color": look.CURVE_COLOURS[0], "source": line}
-            curve = [plot.line("x", "value", **style), plot.scatter("x", "value", size=5, **style)]
-    choice = {"stylesheets": [models.InlineStyleSheet(css=_DARK)], "sizing_mode": "stretch_width"}
-    names = [(name, about["title"]) for name, about in sweep.variables.items()]
-    variable = models.Select(title="variable", value=sweep.var, options=names, **choice)
-    slices = [
-        models.Select(title="slice", value="0", options=[(str(k), text) for k, text in enumerate(texts)], **choice)
-        for texts in sweep.slices
-    ]
-    show = models.CustomJS(
-        args={
-            "plot": plot,
-            "paint": paint,
-            "bars": bars,
-            "axes": [*plot.xaxis, *plot.yaxis],
-            "drawn": drawn,
-            "view": view,
-            "edges": edges,
-            "doubtful": doubtful,
-            "line": line,
-            "curve": curve,
-            "variable": variable,
-            "slices": slices,
-            "columns": columns.astype(np.int32),
-            "rows": (rows * len(horizontal.values)).astype(np.int32),
-            "size": sweep.size,
-            "cells": sweep.cells,
-            "variables": sweep.variables,
-            "coordinates": sweep.coordinates,
-        },
-        code=(files("ringsweep.plots") / "page.js").read_text(encoding="utf-8"),
-    )
-    for chooser in (variable, *slices):
-        chooser.js_on_change("value", show)
-    tell = models.CustomJSHover(code="return ringsweep_tell(special_vars)")
-    for renderer in (drawn, *curve[-1:]):
-        # Over a line, wherever the pointer is, the nearest cell tells its numbers.
-        how = {"mode": "vline" if renderer in curve else "mouse", "limit": 1}
-        plot.add_tools(models.HoverTool(tooltips=_TOOLTIP, formatters={"@{value}": tell}, renderers=[renderer], **how))
-    document = Document()
-    notes = models.Div(text="; ".join([sweep.title, *sweep.notes]), render_as_text=True, sizing_mode="stretch_width")
-    choosers = row(variable, *slices, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
-    document.add_root(column(notes, choosers, plot, sizing_mode="stretch_both"))
-    document.js_on_event(DocumentReady, show)
-    return document
+    return plot
+
+
+def _colour_bars(plot: Any, about: dict[str, Any], colours: tuple[list[str], float, float]) -> list[Any]:
+    """Colour bars of a variable, to the right of a plot and, for a narrow page, below."""
+    from bokeh import models
+
+    palette, low, high = colours
+    kind = models.LogColorMapper if about["logarithmic"] else models.LinearColorMapper
+    # Numbers of a page are rounded: the least one must not fall below the scale, where only zeros are.
+    zeros = {"low": 0.99 * low, "low_color": ZERO} if about["logarithmic"] else {"low": low}
+    style: dict[str, Any] = {"color_mapper": kind(palette=palette, high=high, **zeros), "visible": False}
+    if about["words"] is not None:
+        style["ticker"] = models.FixedTicker(ticks=list(range(len(about["words"]))))
+    bars = [models.ColorBar(**style, major_label_text_font_size=f"{size}px") for size in (12, 11)]
+    for bar, side in zip(bars, ("right", "below"), strict=True):
+        plot.add_layout(bar, side)
+    return bars
+
+
+def _points(plot: Any, sweep: _Sweep, paint: Any) -> dict[str, Any]:
+    """Draw cells that are points; returns what the script knows of them."""
+    from bokeh import models
+
+    assert sweep.points is not None
+    assert sweep.vertical is not None
+    count = sweep.points.size
+    places = {"x": sweep.horizontal.values_at(sweep.points), "y": sweep.vertical.values_at(sweep.points)}
+    view = models.ColumnDataSource(places | {"value": np.zeros(count, dtype=np.float32)})
+    size = float(np.clip(300 / math.sqrt(count), 5, 14))
+    fill = {"field": "value", "transform": paint}
+    drawn = plot.scatter("x", "y", size=size, line_color=None, fill_color=fill, source=view)
+    doubtful = models.ColumnDataSource({"x": [], "y": []})
+    plot.scatter("x", "y", marker="x", size=0.6 * size, line_color="black", source=doubtful)
+    known = {"drawn": drawn, "view": view, "edges": None, "doubtful": doubtful, "line": None, "curve": []}
+    return known | {"columns": np.arange(count, dtype=np.int32), "rows": np.zeros(1, dtype=np.int32), "size": count}
+
+
+def _cells(plot: Any, sweep: _Sweep, paint: Any) -> dict[str, Any]:
+    """Draw cells of a grid, over one quantity a curve too; returns what the script knows of them."""
+    from bokeh import models
+
+    horizontal, vertical = sweep.horizontal, sweep.vertical
+    edges = [horizontal.edges, vertical.edges if vertical else np.array([0.0, 1.0])]
+    columns = _cells_of_pixels(edges[0], horizontal.scale)
+    rows = _cells_of_pixels(edges[1], vertical.scale if vertical else "linear")
+    view = models.ColumnDataSource({"value": [np.zeros((len(rows), len(columns)), dtype=np.float32)]})
+    (left, right), (bottom, top) = ((float(e[0]), float(e[-1])) for e in edges)
+    plot.x_range, plot.y_range = models.Range1d(left, right), models.Range1d(bottom, top)
+    drawn = plot.image("value", x=left, y=bottom, dw=right - left, dh=top - bottom, source=view, color_mapper=paint)
+    doubtful = models.ColumnDataSource({"left": [], "right": [], "bottom": [], "top": []})
+    style = {"fill_color": None, "line_color": None, "hatch_pattern": "/", "hatch_scale": 8, "hatch_weight": 0.5}
+    plot.quad("left", "right", "bottom", "top", source=doubtful, **style)
+    known = {"drawn": drawn, "view": view, "edges": edges, "doubtful": doubtful, "line": None, "curve": []}
+    width, height = len(horizontal.values), len(vertical.values) if vertical else 1
+    if vertical is None:
+        known["line"] = models.ColumnDataSource({"x": horizontal.values, "value": np.zeros(width, dtype=np.float32)})
+        style = {"color": look.CURVE_COLOURS[0], "source": known["line"]}
+        known["curve"] = [plot.line("x", "value", **style), plot.scatter("x", "value", size=5, **style)]
+    return known | {
+        "columns": columns.astype(np.int32),
+        "rows": (rows * width).astype(np.int32),
+        "size": width * height,
+    }
 
 
 def _cells_of_pixels(edges: NDArray[Any], scale: str) -> NDArray[np.intp]:

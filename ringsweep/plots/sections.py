@@ -429,6 +429,7 @@ def _axis(ds: xr.Dataset, x: str | None, needed: str | None = None) -> Axis:
 
 
 def _finish(ax: Axes, axis: Axis, label: str) -> None:
+    look.small_ticks(ax)
     axis.apply(ax.set_xscale, ax.xaxis)
     edges = axis.edges
     ax.set_xlim(edges[0], edges[-1])
