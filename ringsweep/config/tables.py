@@ -67,10 +67,8 @@ def _warn_of_overshoot(times: NDArray[np.float64], samples: NDArray[np.float64],
     between = CubicSpline(times, samples)(times[:-1] + np.diff(times) * np.linspace(0.0, 1.0, 9)[:, None])
     beyond = max(np.max(between) - np.max(samples), np.min(samples) - np.min(between))
     if beyond > _OVERSHOOT * np.ptp(samples):
-        warn_once(
-            "scene.%s: the spline leaves the range of its table by %.3g; `interpolate: monotone` stays between rows",
-            *(section, beyond),
-        )
+        cure = "`interpolate: monotone` stays between rows"
+        warn_once(f"scene.%s: the spline leaves the range of its table by %.3g; {cure}", section, beyond)
 
 
 def read_table(
@@ -116,22 +114,17 @@ def read_table(
     if len(x) < least:
         raise InputError(f"{where}.{first}", f"{len(x)} rows are too few: a table needs at least {least}")
     unit = columns[first].unit
-    backward = np.flatnonzero(np.diff(x) <= 0.0)
-    if len(backward):
-        i = int(backward[0]) + 1
+    for i in 1 + np.flatnonzero(np.diff(x) <= 0.0)[:1]:
         raise InputError(f"{where}.{first}.{i}", f"{x[i]:g} {unit} does not come after {x[i - 1]:g} {unit}")
     if x[0] > 0.0:
         raise InputError(f"{where}.{first}.0", f"the table begins at {x[0]:g} {unit}: it must begin at 0 {unit}")
     # The coefficients of the cubics between rows, and what is computed from them, must not overflow.
     with np.errstate(all="ignore"):
         cube = np.diff(x) ** 3
-        steep = np.flatnonzero(~np.isfinite(_ROOM * np.diff(y) / cube) | ~np.isfinite(_ROOM * np.diff(y) + cube))
-    if len(steep):
-        i = int(steep[0]) + 1
-        raise InputError(
-            f"{where}.{second}.{i}",
-            f"from {y[i - 1]:g} to {y[i]:g} over {x[i] - x[i - 1]:g} {unit} is too steep or too far",
-        )
+        steep = ~np.isfinite(_ROOM * np.diff(y) / cube) | ~np.isfinite(_ROOM * np.diff(y) + cube)
+    for i in 1 + np.flatnonzero(steep)[:1]:
+        problem = f"from {y[i - 1]:g} to {y[i]:g} over {x[i] - x[i - 1]:g} {unit} is too steep or too far"
+        raise InputError(f"{where}.{second}.{i}", problem)
     return x, y
 
 
