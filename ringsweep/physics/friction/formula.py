@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -201,6 +201,15 @@ def _shown(node: ast.AST) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+_OPERATIONS: Mapping[type, Callable[[Node, Node], Node]] = {
+    ast.Add: expressions.add,
+    ast.Sub: lambda a, b: expressions.add(a, expressions.negative(b)),
+    ast.Mult: expressions.multiply,
+    ast.Div: expressions.divide,
+    ast.Pow: expressions.power,
+}
+
+
 class Reader:
     """Makes expressions from the syntax tree of a formula."""
 
@@ -210,33 +219,21 @@ class Reader:
 
     def visit(self, tree: ast.expr, within: tuple[tuple[int, bool], ...]) -> Node:
         """Expression of a part of the formula, within some switches."""
-        if isinstance(tree, ast.Constant):
-            if isinstance(tree.value, bool) or not isinstance(tree.value, int | float) or not _finite(tree.value):
-                raise FormulaError(f"{_shown(tree)} is not a finite number")
-            return number(tree.value)
-        if isinstance(tree, ast.Name):
-            return self._named(tree.id)
-        if isinstance(tree, ast.UnaryOp) and isinstance(tree.op, ast.UAdd | ast.USub):
-            inner = self.visit(tree.operand, within)
-            return expressions.negative(inner) if isinstance(tree.op, ast.USub) else inner
-        if isinstance(tree, ast.BinOp):
-            return self._binary(tree, within)
-        if isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name) and not tree.keywords:
-            return self._call(tree, tree.func.id, within)
-        raise FormulaError(f"{_shown(tree)} is not understood (allowed: {self.language.grammar})")
-
-    def _binary(self, tree: ast.BinOp, within: tuple[tuple[int, bool], ...]) -> Node:
-        a, b = self.visit(tree.left, within), self.visit(tree.right, within)
-        if isinstance(tree.op, ast.Sub):
-            return expressions.add(a, expressions.negative(b))
-        for kind, operation in (
-            (ast.Add, expressions.add),
-            (ast.Mult, expressions.multiply),
-            (ast.Div, expressions.divide),
-            (ast.Pow, expressions.power),
-        ):
-            if isinstance(tree.op, kind):
-                return operation(a, b)
+        match tree:
+            case ast.Constant(value=value):
+                if isinstance(value, bool) or not isinstance(value, int | float) or not _finite(value):
+                    raise FormulaError(f"{_shown(tree)} is not a finite number")
+                return number(value)
+            case ast.Name(id=name):
+                return self._named(name)
+            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
+                return self.visit(inner, within)
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return expressions.negative(self.visit(inner, within))
+            case ast.BinOp(left=left, op=operation, right=right) if type(operation) in _OPERATIONS:
+                return _OPERATIONS[type(operation)](self.visit(left, within), self.visit(right, within))
+            case ast.Call(func=ast.Name(id=name), keywords=[]):
+                return self._call(tree, name, within)
         raise FormulaError(f"{_shown(tree)} is not understood (allowed: {self.language.grammar})")
 
     def _call(self, tree: ast.Call, name: str, within: tuple[tuple[int, bool], ...]) -> Node:
@@ -261,23 +258,23 @@ class Reader:
             return found
         # Beyond some speed the function is constant but for rounding, and so it may be below some speed: there the law
         # has regions of its own, in which steps need not resolve what has long decayed.
+        falling, is_exp = expressions.negative(inner), name == "exp"
+        low, high = (expressions.ZERO, expressions.ZERO) if is_exp else (number(-1.0), expressions.ONE)
+        order = 1 if is_exp else 2
+        found = self._switch(Threshold(None, falling if is_exp else inner, order, "tail", within), found, high)
         moved = expressions.substitute(inner, {SPEED: expressions.ZERO}) is not expressions.ZERO
-        exponent = expressions.negative(inner)
-        if name == "exp":
-            tail = Threshold(None, exponent, 1, "tail", within)
-            found = self._switch(tail, found, expressions.ZERO)
-            if not (moved and expressions.derivative(inner).varies):
-                return found
-            return self._switch(Threshold(None, exponent, 1, "head", within), expressions.ZERO, found)
-        found = self._switch(Threshold(None, inner, 2, "tail", within), found, expressions.ONE)
-        if not moved:
-            return found
-        return self._switch(Threshold(None, exponent, 2, "head", within), number(-1.0), found)
+        if moved and not (is_exp and not expressions.derivative(inner).varies):
+            found = self._switch(Threshold(None, falling, order, "head", within), low, found)
+        return found
 
-    def _switch(self, threshold: Threshold, below: Node, above: Node) -> Node:
+    def _index(self, threshold: Threshold) -> int:
+        """Index of a threshold, which is added if it is new."""
         if threshold not in self.thresholds:
             self.thresholds.append(threshold)
-        return expressions.switch(self.thresholds.index(threshold), below, above)
+        return self.thresholds.index(threshold)
+
+    def _switch(self, threshold: Threshold, below: Node, above: Node) -> Node:
+        return expressions.switch(self._index(threshold), below, above)
 
     def _extreme(self, name: str, a: Node, b: Node, within: tuple[tuple[int, bool], ...]) -> Node:
         """Smaller or greater of two expressions."""
@@ -307,18 +304,11 @@ class Reader:
             raise FormulaError(f"{_shown(tree)}: write {example}")
         condition, first, *rest = tree.args
         limit, lower = self._limit(condition)
-        threshold = Threshold(limit, within=within)
-        if threshold not in self.thresholds:
-            self.thresholds.append(threshold)
-        index = self.thresholds.index(threshold)
+        index = self._index(Threshold(limit, within=within))
         one = self.visit(first, (*within, (index, lower)))
         last = (*within, (index, not lower))
-        other = self.visit(rest[0], last) if len(rest) == 1 else self._rest(rest, last)
+        other = self.visit(rest[0] if len(rest) == 1 else ast.Call(ast.Name("piecewise"), rest, []), last)
         return expressions.switch(index, one, other) if lower else expressions.switch(index, other, one)
-
-    def _rest(self, rest: list[ast.expr], within: tuple[tuple[int, bool], ...]) -> Node:
-        call = ast.Call(ast.Name("piecewise"), rest, [])
-        return self._piecewise(call, within)
 
     def _limit(self, condition: ast.expr) -> tuple[Node, bool]:
         """What a condition compares the variable with, and whether the condition holds below it."""
