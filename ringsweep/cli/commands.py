@@ -54,7 +54,7 @@ def run_command(arguments: argparse.Namespace) -> int:
     target, picture = _outputs(name, *kind, (config.begins_from,))
 
     if arguments.dry_run:
-        from ringsweep.runs.plan import describe
+        from ringsweep.runs.needs import describe
 
         if arguments.scheduler is not None:
             raise InputError("--dry-run", "measures threads of this machine: leave --backend dask out")

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from ringsweep.errors import InputError
-from ringsweep.runs.plan import duration
+from ringsweep.runs.needs import duration
 
 logger = logging.getLogger("ringsweep")
 

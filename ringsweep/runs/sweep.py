@@ -27,7 +27,7 @@ from ringsweep.quantities.variables import INFERRED, OUTCOMES, Variable, error_a
 from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task, coordinates, kernels_of
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
-from ringsweep.runs.plan import check_room
+from ringsweep.runs.needs import check_room
 from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
 from ringsweep.runs.refined import attributes as refinement_attributes
 from ringsweep.runs.refinement import Refined

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.storage.chunks import Layout
-from ringsweep.storage.files import MANIFEST, WorkingFolder, working_folder
+from ringsweep.storage.files import MANIFEST, WorkingFolder, folder_of, working_folder
 from ringsweep.storage.provenance import differences, fingerprint
 
 logger = logging.getLogger("ringsweep")
@@ -64,6 +64,12 @@ def open_checkpoint(
             checkpoint.clear()
         checkpoint.resume()
         yield checkpoint
+
+
+def cells_done(target: Path, fingerprint: str) -> int:
+    """Number of finished cells that a sweep with this fingerprint has left beside its file."""
+    names = (path.name for path in folder_of(target).glob(f"{fingerprint[:12]}-*.npz"))
+    return sum(int(name.split("-")[2]) for name in names)
 
 
 class Checkpoint:

@@ -83,8 +83,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
             raise InputError(str(path), f"{folder} is not a folder")
         # Raises if the file system does not accept the name.
         with suppress(FileNotFoundError):
-            _folder_of(target).stat()
-        if _folder_of(target).exists():
+            folder_of(target).stat()
+        if folder_of(target).exists():
             # Removes what a killed process left. If something forbids it, the writer reports it.
             with suppress(InputError), working_folder(target):
                 pass
@@ -134,7 +134,7 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
         If another process uses the folder, it was not made by this package, or it cannot be written.
     """
     check_name(target)
-    folder = _folder_of(target)
+    folder = folder_of(target)
     mode = 0o777
     with suppress(FileNotFoundError):
         # A user who may not read the file may not read its cells either.
@@ -331,7 +331,8 @@ def flush_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-def _folder_of(target: Path) -> Path:
+def folder_of(target: Path) -> Path:
+    """Folder of the unfinished cells of a file."""
     return target.with_name(f"{target.name}.partial")
 
 

@@ -1,7 +1,5 @@
 """What a sweep needs is told before it runs, and a sweep that cannot fit is refused."""
 
-from threading import Event
-from time import monotonic
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,14 +10,13 @@ import ringsweep
 from ringsweep import cli
 from ringsweep.config import load, with_refine
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import INFERRED
-from ringsweep.runs import plan
+from ringsweep.quantities.flags import FAILED
+from ringsweep.runs import needs
 from ringsweep.runs.cells import TaskResult
 from ringsweep.runs.executors import Execution
-from ringsweep.runs.refined import KnownLabels, decide
 from ringsweep.runs.sweep import write
+from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint
-from ringsweep.storage.chunks import Layout
 
 
 @pytest.fixture
@@ -42,9 +39,9 @@ def test_dry_run_tells_cells_memory_disk_and_time_and_writes_nothing(sweep, tmp_
     assert lines["cells"] == "64 (drive_amplitude 8, zone_half_angle 8)"
     assert lines["memory"].startswith("some 300 MB of ")
     assert "while it runs, then" in lines["disk"]
-    assert "on 1 threads" in lines["time"]
-    assert "cells spread over the grid" in lines["time"]
-    assert "nothing was written" in lines
+    assert lines["time"].startswith("about ")
+    assert lines["time"].endswith(" on 1 threads, once the kernels are compiled")
+    assert list(lines) == ["cells", "memory", "disk", "time"]
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 
@@ -58,9 +55,8 @@ def test_size_of_the_file_is_the_one_told(sweep, tmp_path, capsys, n):
 
 
 def test_hundred_million_cells_are_told_at_once(sweep, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(plan, "_MOST", 100)
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=10**12))
-    monkeypatch.setattr(plan, "memory_of_machine", lambda: 1e11)
+    monkeypatch.setattr(needs, "memory_of_machine", lambda: 1e11)
     assert cli.main(["run", sweep(10_000), "--dry-run"]) == 0
     out = capsys.readouterr().out
     assert "cells: 100000000" in out
@@ -69,40 +65,32 @@ def test_hundred_million_cells_are_told_at_once(sweep, tmp_path, monkeypatch, ca
     assert "1e+12 cells: at most 1e+08" in capsys.readouterr().err
 
 
-def test_dry_run_counts_the_cells_that_an_earlier_sweep_has(sweep, capsys):
+def test_dry_run_counts_the_cells_that_are_done(sweep, capsys, monkeypatch):
+    def told(*options):
+        assert cli.main(["run", *options, "--dry-run"]) == 0
+        return capsys.readouterr().out.splitlines()[0]
+
     assert cli.main(["run", sweep(3), "-q", "-o", "old.nc"]) == 0
-    assert cli.main(["run", sweep(5), "--dry-run", "--reuse", "old.nc"]) == 0
-    assert "reuse: 9 of them are taken from old.nc" in capsys.readouterr().out
-    assert cli.main(["run", sweep(3), "--dry-run", "--reuse", "old.nc"]) == 0
-    assert "time: hardly any: no cell is run" in capsys.readouterr().out
+    assert told("a.yaml", "-o", "old.nc").endswith("; 9 of them are done")
+    assert told("a.yaml", "-o", "new.nc", "--reuse", "old.nc").endswith("; 9 of them are done")
+    assert told(sweep(5), "-o", "new.nc", "--reuse", "old.nc").endswith("; 9 of them are done")
+    put = Checkpoint.put
+
+    def stop(self, *cells):
+        put(self, *cells)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoint, "put", stop)
+        patch.setattr(TaskSizes, "next", lambda self, left: 4)
+        assert cli.main(["run", "a.yaml"]) == 130
+    assert told("a.yaml").endswith("; 4 of them are done")
+    assert told(sweep(4)) == "cells: 16 (drive_amplitude 4, zone_half_angle 4)"
 
 
 def test_dry_run_of_a_refined_sweep_tells_upper_bounds(sweep, capsys):
     assert cli.main(["run", sweep(8), "--dry-run", "--refine"]) == 0
-    said = capsys.readouterr().out
-    assert said.count("at most") == 4
-    assert "are expected to be run" in said.splitlines()[0]
-
-
-def test_dry_run_estimates_how_many_cells_of_a_refined_map_are_run(sweep):
-    """Of a known map, a disc, decisions ask for about as many cells as the measured ones let expect."""
-    side, draw = 256, np.random.default_rng(1)
-    config = with_refine(load(sweep(side)), True)
-    layout = Layout((side, side))
-
-    def columns(positions):
-        row, column = layout.indices(positions)
-        inside = np.hypot(row - 100, column - 130) < 60
-        return {"regime": inside.astype(np.int8), "certified": np.ones(len(positions), dtype=np.int8)}
-
-    labels = KnownLabels(config, layout.total)
-    found = decide(config, layout, labels, lambda positions: labels.put(positions, columns(positions)))
-    truth = np.count_nonzero(found.origin != INFERRED)
-    measured = draw.permutation(layout.total)[:2000]
-    expected = plan.expected_cells(config, layout, [TaskResult(measured, columns(measured), 1.0, {}, "")])
-    assert expected == pytest.approx(truth, rel=0.4)
-    assert truth < 0.2 * layout.total
-    assert not plan.expected_cells(load("a.yaml"), layout, [TaskResult(measured, columns(measured), 1.0, {}, "")])
+    assert capsys.readouterr().out.count("at most") == 4
 
 
 @pytest.mark.parametrize("dry", [True, False])
@@ -112,24 +100,24 @@ def test_sweep_that_does_not_fit_is_refused_before_its_first_cell(sweep, tmp_pat
         monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1000))
         message = f" kB on the disk, and 1 kB are free in {tmp_path}"
     else:
-        monkeypatch.setattr(plan, "memory_of_machine", lambda: 1e6)
+        monkeypatch.setattr(needs, "memory_of_machine", lambda: 1e6)
         message = "the grid needs 300 MB of memory, and this machine has 1 MB"
     monkeypatch.setattr("ringsweep.runs.sweep.compute_task", None)
-    monkeypatch.setattr(plan, "compute_task", None)
+    monkeypatch.setattr(needs, "compute_task", None)
     assert cli.main(["run", sweep(8), *["--dry-run"] * dry]) == 2
     assert message in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 
 def test_sweep_in_memory_that_does_not_fit_is_refused(scene, monkeypatch):
-    monkeypatch.setattr(plan, "memory_of_machine", lambda: 300e6)
+    monkeypatch.setattr(needs, "memory_of_machine", lambda: 300e6)
     with pytest.raises(InputError, match="of memory, and this machine has"):
         ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, progress=False)
 
 
 def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, tmp_path, monkeypatch):
     config = load(sweep(8))
-    room = 64 * plan.bytes_of_cell(config)
+    room = 64 * needs.bytes_of_cell(config)
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=room))
     put = Checkpoint.put
 
@@ -144,7 +132,7 @@ def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, t
         patch.setattr(Checkpoint, "put", full)
         with pytest.raises(OSError, match="No space"):
             write(config, tmp_path / "a.nc", Execution(progress=False))
-    room = 63 * plan.bytes_of_cell(config)
+    room = 63 * needs.bytes_of_cell(config)
     assert write(config, tmp_path / "a.nc", Execution(progress=False))
 
 
@@ -152,74 +140,49 @@ def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, t
 def test_columns_take_no_more_bytes_than_planned(scene, solver):
     config = {"scene": scene, "solver": solver, "sweep": {"grid": {"drive.amplitude": [0.5, 2.0]}}}
     found = ringsweep.run(config, progress=False)
-    bytes_of_cell = plan.bytes_of_cell(load(config))
+    bytes_of_cell = needs.bytes_of_cell(load(config))
     taken = sum(variable.dtype.itemsize for variable in found.data_vars.values())
     assert taken <= bytes_of_cell <= taken + 8
 
 
-def test_time_is_that_of_the_measured_cells_shared_among_threads(sweep, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("n", "time"), [(8, "2.1 min"), (244, "33 h")])
+def test_time_is_that_of_the_measured_cells_shared_among_threads(sweep, tmp_path, monkeypatch, n, time):
     def compute(config, layout, positions):
-        return TaskResult(positions, {}, 6.0 * len(positions), {}, "")
+        ended = {"regime": np.zeros(len(positions)), "t_end": np.zeros(len(positions))}
+        return TaskResult(positions, ended, 6.0 * len(positions), {}, "")
 
-    monkeypatch.setattr(plan, "compute_task", compute)
-    assert "time: about 2.1 min on 3 threads" in plan.describe(load(sweep(8)), tmp_path / "a.nc", 3)
-    assert "time: about 33 h on 3 threads" in plan.describe(load(sweep(244)), tmp_path / "a.nc", 3)
-
-
-@pytest.mark.parametrize(
-    ("ready", "message"), [(1, "time: more than 32 s on 2 threads"), (0, "time: not known: the fi")]
-)
-def test_cells_that_take_longer_than_the_measurement_are_not_waited_for(sweep, tmp_path, monkeypatch, ready, message):
-    ended, quick = Event(), iter(range(ready))
-
-    def compute(config, layout, positions):
-        if next(quick, None) is None:
-            ended.wait(60.0)
-        return TaskResult(positions, {}, None, {}, "")
-
-    monkeypatch.setattr(plan, "compute_task", compute)
-    monkeypatch.setattr(plan, "_FIRST", 0.5)
-    found = plan.describe(load(sweep(8)), tmp_path / "a.nc", 2)
-    ended.set()
-    assert message in found
+    monkeypatch.setattr(needs, "compute_task", compute)
+    assert f"time: about {time} on 3 threads" in needs.describe(load(sweep(n)), tmp_path / "a.nc", 3)
 
 
-def test_time_of_long_cells_follows_from_their_first_steps(sweep, tmp_path, monkeypatch):
-    ended = Event()
+@pytest.mark.parametrize("solver", [{"method": "auto", "max_steps": 10**9}, {"method": "rk4", "steps": 10**7}])
+def test_time_of_long_cells_follows_from_their_first_steps(sweep, tmp_path, monkeypatch, solver):
+    """A thousand steps reach a ten-thousandth of the span."""
 
     def compute(config, layout, positions):
-        if config.solver.max_steps > 1000:
-            ended.wait(60.0)
-        reached = np.full(len(positions), 1e-4 * config.scene.values["time.span"])
-        return TaskResult(positions, {"t_end": reached}, 0.05 * len(positions), {}, "")
+        assert getattr(config.solver, "steps", 1000) == getattr(config.solver, "max_steps", 1000) == 1000
+        failed = "max_steps" in solver
+        span = config.scene.values["time.span"]
+        ended = {"regime": np.full(len(positions), FAILED if failed else 0)}
+        ended["t_end"] = np.full(len(positions), 1e-4 * span if failed else span)
+        return TaskResult(positions, ended, 0.05 * len(positions), {}, "")
 
-    monkeypatch.setattr(plan, "compute_task", compute)
-    found = plan.describe(load(sweep(8, solver={"method": "auto", "max_steps": 10**9})), tmp_path / "a.nc", 2)
-    ended.set()
-    assert "time: about 4.4 h on 2 threads, once the kernels are compiled (from 1000 steps of a cell" in found
+    monkeypatch.setattr(needs, "compute_task", compute)
+    assert "time: about 4.4 h on 2 threads" in needs.describe(load(sweep(8, solver=solver)), tmp_path / "a.nc", 2)
 
 
-@pytest.mark.parametrize(
-    ("solver", "limit"), [({"method": "auto"}, "max_steps"), ({"method": "rk4", "steps": 10**9}, "steps")]
-)
-def test_long_cells_are_not_waited_for_while_their_kernels_are_compiled(sweep, tmp_path, monkeypatch, solver, limit):
-    ended, limits = Event(), []
+def test_time_of_a_sampled_sweep_is_that_of_all_its_runs(sweep, tmp_path, monkeypatch):
+    sample = {"n": 64, "of": {"friction.rest.mu_k": {"uniform": [0.05, 0.1]}}}
+    config = load({"scene": load(sweep(2)).source["scene"], "sweep": {"sample": sample}})
 
     def compute(config, layout, positions):
-        limits.append(most := getattr(config.solver, limit))
-        if most > 1e6:
-            ended.wait(60.0)
-        return TaskResult(positions, {}, None, {}, "")
+        ended = {"regime": np.zeros(len(positions)), "t_end": np.zeros(len(positions))}
+        return TaskResult(positions, ended, 2.0 * len(positions), {}, "")
 
-    monkeypatch.setattr(plan, "compute_task", compute)
-    began = monotonic()
-    found = plan.describe(load(sweep(8, solver=solver)), tmp_path / "a.nc", 2)
-    took = monotonic() - began
-    ended.set()
-    assert "time: more than 32 s on 2 threads" in found
-    assert took < 20.0
-    # A thread of the test before may still be running, with its own limit.
-    assert min(limits) <= 1000
+    monkeypatch.setattr(needs, "compute_task", compute)
+    told = needs.describe(config, tmp_path / "a.nc", 1)
+    assert "cells: 1; 64 runs in each" in told
+    assert "time: about 2.1 min on 1 threads" in told
 
 
 def test_numbers_at_the_edge_of_a_double_give_a_file_without_a_picture(scene, tmp_path, monkeypatch, caplog):
@@ -244,4 +207,4 @@ PEAKS = {512: 354e6, 1024: 465e6, 2048: 505e6, 4096: 892e6}
 
 @pytest.mark.parametrize("side", PEAKS)
 def test_memory_that_is_told_is_what_a_refined_map_took(sweep, side):
-    assert 0.95 < plan.memory_needed(with_refine(load(sweep(side)), True), False) / PEAKS[side] < 1.25
+    assert 0.95 < needs.memory_needed(with_refine(load(sweep(side)), True), False) / PEAKS[side] < 1.25

@@ -1,0 +1,182 @@
+"""What a sweep needs: cells, memory, disk and time, before it runs."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from contextlib import suppress
+from dataclasses import fields, replace
+from pathlib import Path
+
+import joblib
+import numpy as np
+
+from ringsweep.config import Config
+from ringsweep.config.axes import values_at
+from ringsweep.errors import InputError
+from ringsweep.models import model_of
+from ringsweep.quantities.flags import FAILED
+from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.runs import sampled
+from ringsweep.runs.cells import compute_task
+from ringsweep.runs.reuse import EarlierSweep
+from ringsweep.solvers.certificate import with_errors
+from ringsweep.storage import netcdf
+from ringsweep.storage.checkpoint import cells_done
+from ringsweep.storage.chunks import Layout
+from ringsweep.storage.provenance import fingerprint, identity
+
+# Bytes of this process without cells, and for each cell of the grid; from benchmarks/results/sizes.md.
+_PROCESS, _BOOKKEEPING = 300e6, 33.0
+
+# Bytes for each cell of the picture, which has no more pixels than that; for each cell if numbers are interpolated.
+_PICTURE, _MOST_DRAWN, _INTERPOLATING = 120.0, 1 << 20, 40.0
+
+# Bytes of a finished file without cells, and the share of its columns that compression leaves: 0.55 of some thousand
+# cells, 0.4 of millions.
+_FILE, _COMPRESSED = 40e3, 0.55
+
+# Steps of each run that is measured, most of these runs, and seconds to measure them.
+_FEW, _MOST, _MEASURING = 1000, 100_000, 0.5
+
+
+def bytes_of_cell(config: Config) -> int:
+    """Size of the columns of a cell, or of its sums; variables that some solvers leave out are counted."""
+    if config.sample is not None:
+        return sampled.bytes_of_part(config) * config.sample.replicates
+    model = model_of(config.scene.structure)
+    columns = model.columns(config.scene.structure)
+    names = [*(name for name in columns if name not in model.absent), "steps", "certified", "uncertified_because"]
+    bounded = with_errors(model.outcomes) if getattr(config.solver, "certify", False) else ()
+    names += ["stiffness", *(f"{name}_error" for name in bounded)]
+    return sum(np.dtype(OUTCOMES[name].dtype).itemsize for name in names)
+
+
+def check_room(config: Config, cells: int, folder: Path | None) -> None:
+    """Make sure that a sweep fits into the memory, and onto the disk.
+
+    Parameters
+    ----------
+    config : Config
+    cells : int
+        Number of cells that are still to be computed.
+    folder : Path, optional
+        Where the file is written; None for a sweep in memory.
+
+    Raises
+    ------
+    InputError
+        If it does not fit.
+    """
+    needed, there = memory_needed(config, folder is None), memory_of_machine()
+    if needed > there:
+        raise InputError("sweep", f"the grid needs {size(needed)} of memory, and this machine has {size(there)}")
+    # How many cells a refined sweep runs is not known before.
+    if folder is None or config.refine is not None:
+        return
+    needed, there = float(cells * bytes_of_cell(config)), shutil.disk_usage(folder).free
+    if needed > there:
+        raise InputError(
+            "sweep", f"{cells} cells need {size(needed)} on the disk, and {size(there)} are free in {folder}"
+        )
+
+
+def memory_needed(config: Config, in_memory: bool) -> float:
+    """Bytes of memory that a sweep takes at most."""
+    total = Layout(tuple(config.axes.sizes.values())).total
+    interpolates = config.refine is not None and config.refine.also is not None
+    each = _BOOKKEEPING + _INTERPOLATING * interpolates + (2.0 * bytes_of_cell(config) if in_memory else 0.0)
+    return _PROCESS + total * each + min(total, _MOST_DRAWN) * _PICTURE
+
+
+def memory_of_machine() -> float:
+    """Bytes of memory that this process may use at most."""
+    found = math.inf
+    # Some systems do not tell.
+    with suppress(AttributeError, OSError, ValueError):
+        found = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    # A container may have less.
+    with suppress(OSError, ValueError):
+        found = min(found, float(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return found
+
+
+def describe(config: Config, target: Path, jobs: int | None, reuse: str | os.PathLike[str] | None = None) -> str:
+    """Cells, memory, disk and estimated time of a sweep, as lines of text. Some of its runs are begun for it.
+
+    Cells that are done, or that the file `reuse` of an earlier sweep has, are counted and take no time.
+
+    Raises
+    ------
+    InputError
+        If it fits neither into the memory nor onto the disk.
+    """
+    sizes, folder, threads = config.axes.sizes, target.resolve().parent, jobs or joblib.cpu_count()
+    layout, runs, key = Layout(tuple(sizes.values())), 1, fingerprint(identity(config))
+    done = cells_done(target.resolve(), key)
+    if config.sample is not None:
+        done, runs = done // config.sample.replicates, config.sample.n * config.sample.rows
+    if target.exists():
+        with netcdf.open_dataset(target) as ds:
+            done = layout.total if ds.attrs.get("fingerprint") == key else done
+    elif reuse is not None and config.sample is None:
+        earlier = EarlierSweep(reuse, config)
+        config, none = earlier.align_axes(config), np.zeros(layout.total, dtype=bool)
+        done += sum(len(positions) for positions, _ in earlier.shared_cells(config, layout, none, ()))
+    check_room(config, layout.total - done, folder)
+    columns = float(layout.total * bytes_of_cell(config))
+    finished = _FILE + columns * (_COMPRESSED if layout.total >= netcdf.COMPRESSED_FROM else 1.0)
+    left = (layout.total - done) * runs
+    seconds = _seconds_of_run(config) * left / min(threads, left) if left else 0.0
+    most = "at most " if config.refine is not None else ""
+    words = [f"{most}{layout.total}", f"{runs} runs in each" * (runs > 1), f"{done} of them are done" * bool(done)]
+    words[0] += f" ({', '.join(f'{name} {length}' for name, length in sizes.items())})" * bool(sizes)
+    return "\n".join(
+        (
+            f"cells: {'; '.join(filter(None, words))}",
+            f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
+            f"disk: {most}{size(columns + finished)} while it runs, then {most}{size(finished)}"
+            f"; {size(shutil.disk_usage(folder).free)} are free in {folder}",
+            f"time: {most}about {duration(seconds)} on {threads} threads, once the kernels are compiled",
+        )
+    )
+
+
+def _seconds_of_run(config: Config) -> float:
+    """Seconds of a run in one thread, from the first steps of runs that are spread over the sweep."""
+    solver, sample = config.solver, config.sample
+    limits = {field.name for field in fields(solver)} & {"steps", "max_steps"}
+    few = replace(solver, **{name: min(getattr(solver, name), _FEW) for name in limits})
+    axes = config.axes if sample is None else sample.axes(config.scene, config.axes, sample.shares(0))
+    # A cell that starts from another one costs about as much.
+    one = replace(config, axes=axes, sample=None, follow=None, solver=few)
+    layout = Layout(tuple(axes.sizes.values()))
+    drawn = np.random.default_rng(0).integers(layout.total, size=_MOST)
+    run, side, seconds, finished = 0, solver.side_by_side, 0.0, 0.0
+    while run < len(drawn) and seconds < _MEASURING:
+        positions = drawn[run : run + side]
+        result = compute_task(one, layout, positions)
+        if result.seconds is None:
+            # Kernels may have been compiled: the next task has the same runs.
+            continue
+        indices = dict(zip(axes.sizes, layout.indices(positions), strict=True))
+        spans = values_at(config.scene, axes, indices, len(positions))["time.span"]
+        unfinished = result.columns["regime"] == FAILED
+        finished += float(np.where(unfinished, result.columns["t_end"] / spans, 1.0).sum())
+        run, side, seconds = run + side, 2 * side, seconds + result.seconds
+    return seconds / finished * getattr(solver, "steps", 1) / getattr(few, "steps", 1)
+
+
+def size(number: float) -> str:
+    """A number of bytes in words."""
+    power = min(int(math.log10(max(number, 1.0)) / 3.0), 4)
+    return f"{number / 1000.0**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"
+
+
+def duration(seconds: float) -> str:
+    """A time in words."""
+    for unit, length in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * length:
+            return f"{seconds / length:.2g} {unit}"
+    return f"{max(seconds, 0.1):.2g} s"
