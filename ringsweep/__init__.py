@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ringsweep.errors import InputError
     from ringsweep.quantities.variables import words
     from ringsweep.runs.attractors import attractors
-    from ringsweep.runs.boundaries import boundary, uncertainty_exponent
+    from ringsweep.runs.boundaries import boundary
     from ringsweep.runs.fit import fit
     from ringsweep.runs.precision import precision
     from ringsweep.runs.simulate import simulate
@@ -32,7 +32,6 @@ __all__ = [
     "simulate",
     "sweep",
     "threshold",
-    "uncertainty_exponent",
     "verify",
     "words",
 ]
@@ -46,7 +45,6 @@ _MODULES = {
     "boundary": "runs.boundaries",
     "threshold": "runs.thresholds",
     "fit": "runs.fit",
-    "uncertainty_exponent": "runs.boundaries",
     "friction_law": "config.own",
     "verify": "storage.netcdf",
     "words": "quantities.variables",

@@ -26,11 +26,6 @@ def curves(ds):
     return ringsweep.boundary(ds, "separating", 1e-4)
 
 
-def labelled(labels):
-    """A map of some labels, without runs."""
-    return xr.Dataset({"regime": (("a", "b"), np.asarray(labels, dtype="int8"))})
-
-
 class TestBoundary:
     @pytest.mark.slow
     def test_regime_changes_within_the_stated_error(self, scene, ds, curves):
@@ -275,41 +270,3 @@ class TestValueThatTheMapLacks:
         curves = ringsweep.boundary(ds.isel(zone_half_angle=4), "separating", 1e-3)
         with pytest.raises(InputError, match=r"another map: this one has half-angle of the zone = 13\.75°"):
             plots.regime_map(ds, sel={"zone.half_angle": "15 deg"}, boundaries=curves)
-
-
-class TestUncertaintyExponent:
-    def test_smooth_boundary_has_the_exponent_one(self):
-        y, x = np.indices((512, 512)) / 512
-        found = ringsweep.uncertainty_exponent(labelled(x**2 + y**2 < 0.5))
-        assert float(found.exponent) == pytest.approx(1.0, abs=0.05)
-        assert found.uncertain.values[0] > found.uncertain.values[-1]
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("side", [257, 512, 1000])
-    def test_straight_lines_have_the_exponent_one_at_any_size_of_the_map(self, side):
-        y, x = np.indices((side, side)) / side
-        random = np.random.default_rng(0)
-        found = []
-        for angle in random.uniform(0.0, np.pi, 20):
-            lines = (x - 0.5) * np.cos(angle) + (y - 0.5) * np.sin(angle) > random.uniform(-0.2, 0.2)
-            found.append(float(ringsweep.uncertainty_exponent(labelled(lines)).exponent))
-        assert np.mean(found) == pytest.approx(1.0, abs=0.01)
-
-    def test_single_cells_that_differ_are_no_boundary_and_give_a_warning(self, caplog):
-        dust = np.random.default_rng(0).random((1024, 1024)) < 1e-3
-        assert float(ringsweep.uncertainty_exponent(labelled(dust)).exponent) > 1.2
-        assert "single cells differ from all around them" in caplog.text
-
-    def test_stripes_over_a_cantor_set_have_their_dimension(self):
-        """It is 1 + log 2 / log 3."""
-        cells = np.arange(3**6)
-        cantor = np.ones(3**6, dtype=bool)
-        for k in range(6):
-            cantor &= cells // 3**k % 3 != 1
-        found = ringsweep.uncertainty_exponent(labelled(np.tile(cantor, (3**6, 1))))
-        assert float(found.dimension) == pytest.approx(1.0 + np.log(2) / np.log(3), abs=0.1)
-
-    def test_too_few_counts_give_a_warning_and_no_number(self, caplog):
-        found = ringsweep.uncertainty_exponent(labelled(np.arange(64).reshape(8, 8) < 30))
-        assert np.isnan(found.exponent)
-        assert "too few counts" in caplog.text

@@ -1,4 +1,4 @@
-"""Boundaries of a map as curves, and whether they are fractal."""
+"""Boundaries of a map as curves."""
 
 from __future__ import annotations
 
@@ -23,9 +23,6 @@ from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
 
 logger = logging.getLogger("ringsweep")
-
-#: Least number of boxes with more than one regime for a size to count in the fit of an exponent.
-FEWEST_BOXES = 30
 
 #: How many cells of a dataset are run again before its boundaries are located.
 _CHECKED_CELLS = 64
@@ -332,104 +329,3 @@ def _joined(low: NDArray[np.intp], axis: NDArray[np.intp], shape: tuple[int, ...
             line.append(number)
             at = next((one for one in neighbours[at] if one in left), None)
     return np.array(order, dtype=np.intp), np.array(line, dtype=np.int32)
-
-
-def uncertainty_exponent(ds: xr.Dataset) -> xr.Dataset:
-    """How fast the part of a map that lies near a boundary shrinks with the distance.
-
-    The map is divided into square boxes. The share of boxes that hold more than one regime, motion, separating contact
-    or aftermath goes like a power of the side of a box. The exponent 1 belongs to a smooth boundary, of dimension 1. A
-    smaller exponent belongs to a boundary of dimension 2 minus the exponent, on which more digits in the parameters
-    hardly help to foretell the regime (Grebogi, McDonald, Ott and Yorke 1983). As in Attractors.jl the result has the
-    counts, so that a reader can judge the fit.
-
-    Parameters
-    ----------
-    ds : xarray.Dataset
-        Result of a sweep over two dimensions.
-
-    Returns
-    -------
-    xarray.Dataset
-        Along the dimension ``epsilon``, the side of the boxes in cells: ``boxes``, ``uncertain`` (their number with
-        more than one label) and ``fitted`` (whether the size counts in the fit). ``exponent``, the standard
-        error ``exponent_error`` that follows from the scatter about the fit alone, and ``dimension`` of the boundary.
-        NaN if there are too few counts; a warning says so. On a curve the exponent differs from 1 by some 0.01 at
-        512 cells a side: counts of few boxes depend on where the curve lies.
-
-    Raises
-    ------
-    InputError
-        If the dataset is no sweep over two dimensions.
-
-    Examples
-    --------
-    A boundary along a circle:
-
-    >>> import numpy as np, ringsweep, xarray as xr
-    >>> y, x = np.indices((512, 512)) / 512
-    >>> maps = xr.Dataset({"regime": (("y", "x"), (x**2 + y**2 < 0.5).astype("int8"))})
-    >>> ringsweep.uncertainty_exponent(maps).exponent.round(1).item()
-    1.0
-    """
-    if "regime" not in ds or ds["regime"].ndim != 2:
-        raise InputError("ds", "is no map of regimes over two dimensions: hold further ones by ds.isel")
-    labels = ds["regime"].values.astype(np.int64)
-    for name in ("motion", "separating_contact", "aftermath"):
-        if name in ds:
-            labels = labels * 32 + ds[name].values
-    # Boxes have cells at their corners and share their edges, so that every boundary lies in a box.
-    least = np.minimum.reduce([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]])
-    greatest = np.maximum.reduce([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]])
-    epsilon, total, count, fitted = _counts(least, greatest)
-    if fitted.any():
-        # All sizes that count must see the same part of the map: it is cropped once.
-        largest = int(epsilon[fitted].max())
-        rows, columns = (size // largest * largest for size in least.shape)
-        epsilon, total, count, fitted = _counts(least[:rows, :columns], greatest[:rows, :columns])
-    exponent, error = np.nan, np.nan
-    if fitted.sum() >= 3:
-        fit, covariance = np.polyfit(np.log(epsilon[fitted]), np.log(count[fitted] / total[fitted]), 1, cov="unscaled")
-        exponent = float(fit[0])
-        rest = np.log(count[fitted] / total[fitted]) - np.polyval(fit, np.log(epsilon[fitted]))
-        error = float(np.sqrt(covariance[0, 0] * (rest**2).sum() / (fitted.sum() - 2)))
-        if exponent > 1.0 + max(0.1, 3.0 * error):
-            logger.warning(
-                "the exponent is %.2f, but that of a boundary is at most 1: single cells differ from all around them",
-                exponent,
-            )
-    else:
-        logger.warning(
-            "too few counts for an uncertainty exponent: %d sizes of boxes have %d or more with two labels, and less "
-            "than half of all; three are needed: a finer map has more",
-            fitted.sum(),
-            FEWEST_BOXES,
-        )
-    return xr.Dataset(
-        {
-            "boxes": ("epsilon", total, {"long_name": "number of boxes"}),
-            "uncertain": ("epsilon", count, {"long_name": "number of boxes with more than one label"}),
-            "fitted": ("epsilon", fitted, {"long_name": "whether the size counts in the fit"}),
-            "exponent": ((), exponent, {"long_name": "uncertainty exponent"}),
-            "exponent_error": ((), error, {"long_name": "scatter of the counts about the fit, as a standard error"}),
-            "dimension": ((), 2.0 - exponent, {"long_name": "dimension of the boundary"}),
-        },
-        coords={"epsilon": ("epsilon", epsilon, {"long_name": "side of a box in cells"})},
-    )
-
-
-def _counts(least: NDArray[Any], greatest: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """Sides of boxes, the number of boxes, how many have more than one label, and whether the side counts in a fit.
-
-    `least` and `greatest` are the extremes of the labels in boxes of side 1.
-    """
-    found: list[tuple[int, int, int]] = []
-    while min(least.shape) >= 4:
-        found.append((2 ** len(found), least.size, int((least != greatest).sum())))
-        rows, columns = (size // 2 for size in least.shape)
-        least, greatest = (
-            reduce(one[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2), axis=(1, 3))
-            for one, reduce in ((least, np.min), (greatest, np.max))
-        )
-    epsilon, total, count = np.array(found, dtype=int).reshape(-1, 3).T
-    return epsilon, total, count, (count >= FEWEST_BOXES) & (count < 0.5 * total)
