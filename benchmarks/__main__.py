@@ -33,7 +33,6 @@ COMMANDS = (
     "sizes",
     "refine",
     "probabilities",
-    "diagram",
     "long_runs",
     "brute_force --count 4000",
     "brute_force --families impact --count 1500",

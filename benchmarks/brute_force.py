@@ -13,10 +13,6 @@ one by one. Each core works on a batch of its own. The benchmark prints a table 
 - ambiguous: the runs of the reference, at other tolerances or with all thresholds shifted by a millionth, do not agree,
   or several contacts could separate. Not compared;
 - unresolved: the reference did not finish within its limits. Not compared;
-- bounded: among certified numbers whose stated bound is at least ten times the error of the reference itself, the share
-  whose true error is within the bound;
-- stated/true: the median of bound over true error, for the same numbers.
-
 A second table has a row for each kind of end of a certified run on two contacts. It says how often a body on compliant
 contacts, :mod:`benchmarks.reference.compliant`, confirmed or contradicted the end, or left it undecided. Contradicted
 ends are printed so that they can be run again. Of the runs whose contacts hold, every twentieth is looked at, where the
@@ -75,8 +71,6 @@ FEW = ("stiction", "belt lugre", "impact")
 HELD_EVERY = 20
 #: Of the certified runs that lose a contact and go on, the compliant body is asked about one in this many.
 LOST_EVERY = 5
-#: Least error of the reference (rad, s, m): it looks at contacts an instant after an event.
-SURE = 1e-9
 RIG = {
     "body.mass": 0.076,
     "body.inertia": 4.47e-5,
@@ -413,7 +407,6 @@ class Count:
     """Counts of one batch or of one family, and the scenes to be printed."""
 
     tally: Counter = field(default_factory=Counter)
-    bounded: list = field(default_factory=list)
     ends: Counter = field(default_factory=Counter)
     seconds: Counter = field(default_factory=Counter)
     listings: list = field(default_factory=list)
@@ -424,7 +417,6 @@ class Count:
     def add(self, other):
         """Add the counts of a batch."""
         self.tally.update(other.tally)
-        self.bounded += other.bounded
         self.ends.update(other.ends)
         self.seconds.update(other.seconds)
 
@@ -486,10 +478,6 @@ def aftermath_opinion(scene, word, verdict, count):
         count.list_scene(f"{said} by the compliant body", scene, f"{found.why}; {verdict.why}", word)
 
 
-#: Restitution up to which few impacts gain energy by Newton's law; their runs are not certified.
-SELDOM_GAINS = 0.8
-
-
 def compare(kind, batch, data, count):
     """Add the runs of a batch to its count."""
     belt = kind.model == "belt"
@@ -512,9 +500,6 @@ def compare(kind, batch, data, count):
         count.tally["runs"] += 1
         count.tally[state] += 1
         count.tally["certified" if certified else "uncertified"] += 1
-        if kind.impact and scene["impact"]["restitution"] <= SELDOM_GAINS:
-            count.tally["moderate restitution"] += 1
-            count.tally["moderate restitution, uncertified"] += not certified
         if state != "clear" or not certified:
             if count.verbose and state == "unresolved":
                 count.list_scene("unresolved", scene, verdict.why, "")
@@ -546,11 +531,6 @@ def compare(kind, batch, data, count):
                 count.tally["off"] += 1
                 why = f"{verdict.why}; phi_end {verdict.numbers['phi_end']:.9g}, t_end {verdict.numbers['t_end']:.9g}"
                 count.list_scene("off", scene, why, said)
-        for name, error in errors.items():
-            stated = float(data[f"{name}_error"][i]) if f"{name}_error" in data else math.nan
-            sure = max(spread[name], SURE)
-            if math.isfinite(stated) and math.isfinite(error) and sure < 0.1 * stated:
-                count.bounded.append((stated >= error - sure, stated / max(error, sure)))
 
 
 def run_batch(task):
@@ -567,21 +547,14 @@ def run_batch(task):
     return count
 
 
-HEADER = ["family", "runs", "certified", "compared", "contradicted", "off", "uncertified", "ambiguous", "unresolved",
-          "bounded", "stated/true"]  # fmt: skip
+HEADER = ["family", "runs", "certified", "compared", "contradicted", "off", "uncertified", "ambiguous", "unresolved"]
 
 
 def row(name, count):
     """Row of the table for one family."""
     tally = count.tally
-    share = 100.0 * tally["uncertified"] / max(tally["runs"], 1)
-    bounded = [b for b, _ in count.bounded]
-    return [
-        name, *(str(tally[n]) for n in HEADER[1:6]), f"{tally['uncertified']} ({share:.1f} %)",
-        str(tally["ambiguous"]), str(tally["unresolved"]),
-        f"{100.0 * np.mean(bounded):.1f} %" if bounded else "",
-        f"{np.median([r for _, r in count.bounded]):.3g}" if bounded else "",
-    ]  # fmt: skip
+    share = f" ({100.0 * tally['uncertified'] / max(tally['runs'], 1):.1f} %)"
+    return [name, *(str(tally[column]) + (share if column == "uncertified" else "") for column in HEADER[1:])]
 
 
 OPINIONS = ("confirmed", "contradicted", "undecided", rattling.SHARED)
@@ -637,25 +610,15 @@ def main():
     _common.table(END_HEADER, end_rows(total.ends))
     cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
     print(f"CPU of all cores: {cost} (compilation included), seed {arguments.seed}")
-    moderate = f"Uncertified with restitution up to {SELDOM_GAINS}: {at_moderate_restitution(total.tally)}"
-    if total.tally["moderate restitution"]:
-        print(moderate)
     if len(chosen) == 1 or not arguments.families:
         text = f"Seed {arguments.seed}; {cost}.\n\n{_common.markdown(HEADER, rows)}"
         text += "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
         text += _common.markdown(END_HEADER, end_rows(total.ends))
-        text += f"\n{moderate}.\n" if total.tally["moderate restitution"] else ""
         title = "Certified answers against an independent reference"
         name = "brute_force" if len(chosen) > 1 else f"brute_force_{next(iter(chosen)).replace(' ', '_')}"
         runs = f"{total.tally['runs']:,}".replace(",", " ")
         figures = {"runs": runs, "contradictions": str(total.tally["contradicted"])}
         _common.publish(arguments, name, title, heading, text, figures)
-
-
-def at_moderate_restitution(tally):
-    """How many runs are uncertified of those in which few impacts gain energy."""
-    runs, uncertified = tally["moderate restitution"], tally["moderate restitution, uncertified"]
-    return f"{uncertified} of {runs} ({100.0 * uncertified / max(runs, 1):.1f} %)"
 
 
 # The 500 scenes of the tests.

@@ -1,12 +1,11 @@
-"""Refined maps against full ones: cost, wrong cells, the bound of the audit; cost against resolution; PhaseMap.
+"""Refined maps against full ones: cost, wrong cells, the bound of the audit; cost against resolution.
 
     python -m benchmarks.refine                # ten minutes: full maps of 512 and 1024 cells a side
     python -m benchmarks.refine --part scaling # or full
     python -m benchmarks.refine --quick        # smaller maps
 
 The scene is the map of the README. A full and a refined map are computed one after the other in one run. CPU seconds
-do not grow with other load on the machine; they contain everything: runs, decisions, files. PhaseMap is optional
-(pip install phasemap); it gets the labels of the full map, since only its evaluations count.
+do not grow with other load on the machine; they contain everything: runs, decisions, files.
 """
 
 from __future__ import annotations
@@ -16,15 +15,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
 import ringsweep
-from benchmarks._common import ALPHA, V0, command, folder_of, heading, machine, markdown, publish, ring, table
+from benchmarks._common import ALPHA, V0, command, heading, machine, markdown, publish, ring, table
 from ringsweep.quantities.variables import INFERRED, LABELS
-from ringsweep.runs.refined import SEED
-from ringsweep.runs.refinement import Answer, refine
 
 SCENE = ring({"law": "bengisu-akay", "alpha": ALPHA, "v0": V0})
 
@@ -54,7 +50,6 @@ def labels_of(ds: xr.Dataset) -> Any:
 def against_full(sides: list[int], folder: str) -> str:
     """Refined and full maps of some sizes."""
     rows = []
-    peers = []
     for side in sides:
         refined, wall, cpu = timed(grid(side), folder, refine=True)
         whole, full_wall, full_cpu = timed(grid(side), folder)
@@ -68,78 +63,31 @@ def against_full(sides: list[int], folder: str) -> str:
             f"{100 * wrong.sum() / inferred:.3f} %", f"{100 * refined.attrs['audit_bound']:.3f} %", str(same),
         ])  # fmt: skip
         print(*rows[-1], flush=True)
-        peers += against_phasemap(labels_of(whole), refined)
     header = ["map", "refined, full", "cells run", "wall clock", "CPU", "cells wrong", "of those inferred",
               "bound on these", "the others equal bit for bit"]  # fmt: skip
     heading("Refined against full")
     table(header, rows)
-    text = "## Refined against full\n\n" + markdown(header, rows)
-    header = ["evaluations and cells whose label is wrong or open", "", "evaluations", "cells"]
-    table(header, peers)
-    return text + "\n## PhaseMap on the same labels\n\n" + markdown(header, peers)
+    return "## Refined against full\n\n" + markdown(header, rows)
 
 
-def decisions(labels: Any, audit: float, seed: int) -> tuple[int, int]:
-    """Evaluations of the refinement on a map of labels that is known, and how many cells it leaves wrong."""
-    rounds = refine((1, *labels.shape), 32, audit, seed=seed)
-    flat, count = labels.ravel(), 0
-    cells = next(rounds)
-    try:
-        while True:
-            count += len(cells)
-            cells = rounds.send(Answer(flat[cells], np.ones(len(cells), dtype=bool)))
-    except StopIteration as end:
-        return count, int((end.value.labels[0] != labels).sum())
-
-
-def against_phasemap(labels: Any, refined: xr.Dataset) -> list[list[str]]:
-    """Evaluations of PhaseMap and of the refinement, and the cells that each leaves wrong or without a label."""
+def scaling(sides: list[int], folder: str) -> str:
+    """Cost against resolution."""
     rows = []
-    for audit, seeds in ((0.0, [SEED]), (0.02, [SEED]), (0.02, list(range(12)))):
-        counts, wrong = np.transpose([decisions(labels, audit, seed) for seed in seeds])
-        name = f"refined, audit {audit:g}" + (f", mean of {len(seeds)} seeds" if len(seeds) > 1 else "")
-        rows.append([f"{len(labels)}²", name, f"{counts.mean():.0f}", f"{wrong.mean():.0f}"])
-    try:
-        from benchmarks.peers.with_phasemap import evaluations
-
-        for halvings, all_corners in ((5, False), (5, True), (6, False)):
-            count, wrong = evaluations(labels, 32, halvings, all_corners=all_corners)
-            name = f"PhaseMap, {halvings} halvings{', all corners' if all_corners else ''}"
-            rows.append([f"{len(labels)}²", name, str(count), str(wrong)])
-    except ImportError:
-        print("PhaseMap is not installed")
-    return rows
-
-
-def scaling(sides: list[int], folder: str, picture: Path) -> str:
-    """Cost against resolution, with a picture."""
-    rows = []
-    cells, seconds = [], []
+    cells = []
     for side in sides:
         found, wall, cpu = timed(grid(side), folder, refine={"audit": 0.0})
         count = int((found.origin != INFERRED).sum())
         rows.append([str(side), f"{wall:.1f}", f"{cpu:.1f}", str(count), f"{count / side:.1f}",
                      f"{100 * count / side**2:.2f} %", f"{0.02 * (side**2 - count):.0f}"])  # fmt: skip
         cells.append(count)
-        seconds.append(cpu)
         found.close()
         print(*rows[-1], flush=True)
     header = ["side", "wall, s", "CPU, s", "cells run", "per cell of the side", "share", "an audit of 2 % adds"]
     heading("Cost against resolution, without an audit")
     table(header, rows)
     slope = np.polyfit(np.log(sides), np.log(cells), 1)[0]
-    figure, axes = plt.subplots(figsize=(5.0, 3.5), layout="constrained")
-    axes.loglog(sides, cells, "o-", label=f"refined: side$^{{{slope:.2f}}}$")
-    axes.loglog(sides, np.square(sides), "k--", label="full: side$^2$")
-    axes.loglog(sides, 0.02 * np.square(sides), "k:", label="what an audit of 2 % adds")
-    axes.set(xlabel="cells along a side", ylabel="cells run", xticks=sides, xticklabels=[str(side) for side in sides])
-    axes.minorticks_off()
-    axes.legend()
-    figure.savefig(picture, dpi=150)
     text = "## Cost against resolution, without an audit\n\n" + markdown(header, rows)
-    return (
-        f"{text}\nCells run grow like side^{slope:.2f}.\n\n![Cells run against the side of the map]({picture.name})\n"
-    )
+    return f"{text}\nCells run grow like side^{slope:.2f}.\n"
 
 
 def main() -> None:
@@ -148,14 +96,14 @@ def main() -> None:
     parser.add_argument("--part", choices=["full", "scaling"], help="only this part, which is only printed")
     parser.add_argument("--sides", type=int, nargs="+", help="cells along a side of the maps of this part")
     given = parser.parse_args()
-    where = machine(["phasemap"])
+    where = machine()
     print(where)
     ringsweep.sweep(SCENE, grid(2), progress=False)
     full, resolutions = ([128], [64, 128]) if given.quick else ([512, 1024], [2**k for k in range(6, 12)])
     with tempfile.TemporaryDirectory() as folder:
         parts = {
             "full": lambda: against_full(given.sides or full, folder),
-            "scaling": lambda: scaling(given.sides or resolutions, folder, folder_of(given) / "refine.png"),
+            "scaling": lambda: scaling(given.sides or resolutions, folder),
         }
         texts = [part() for name, part in parts.items() if given.part in (None, name)]
     if given.part is None:

@@ -22,14 +22,9 @@ Writes `speed.md`.
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,7 +47,6 @@ from benchmarks._common import (
     table,
 )
 from benchmarks.peers import in_c
-from benchmarks.scenes import ROOT, environment
 from benchmarks.work_precision import SCENES
 from ringsweep.models import MODELS
 from ringsweep.runs import sweep
@@ -231,36 +225,6 @@ def rows(given: Sequence[Contender], others: Sequence[Contender], rounds: int) -
     return found
 
 
-#: Prints CPU seconds of a new process: until all is imported, until the first cell, and in LLVM meanwhile.
-FIRST_CELL = """
-import json, time
-import numpy as np
-from numba.core import event
-from ringsweep import config
-from ringsweep.runs.cells import compute_task
-from ringsweep.storage.chunks import Layout
-imported = time.process_time(), time.perf_counter()
-made = config.load("configs/regime_map.yaml")
-with event.install_recorder("numba:llvm_lock") as llvm:
-    compute_task(made, Layout(tuple(made.axes.sizes.values())), np.arange(1))
-done, wall = time.process_time(), time.perf_counter() - imported[1]
-inside, begin = 0.0, None
-for when, what in llvm.buffer:
-    begin, inside = (when, inside) if what.is_start else (None, inside + when - begin)
-print(json.dumps({"imports": imported[0], "all": done, "LLVM": inside * (done - imported[0]) / wall}))
-"""
-
-
-def first_cell() -> list[str]:
-    """Row of the first cell of the map of `configs/regime_map.yaml`, with nothing compiled before."""
-    with tempfile.TemporaryDirectory() as cache:
-        command = [sys.executable, "-c", FIRST_CELL]
-        done = subprocess.run(command, cwd=ROOT, env=environment(Path(cache)), stdout=subprocess.PIPE, check=True)
-    seconds = json.loads(done.stdout)
-    parts = f"imports {seconds['imports']:.1f} s, LLVM {seconds['LLVM']:.1f} s"
-    return ["first cell, nothing compiled", "regime_map.yaml", f"{seconds['all']:.1f} CPU s", "-", "-", parts, "-"]
-
-
 def costly_last(scene: Mapping[str, Any], cells: int, method: str, **options: Any) -> Any:
     """Configuration of a whole family of cells, the most expensive ones last: there an idle core would have to wait."""
     points = at(family(round(cells**0.5)))
@@ -293,7 +257,7 @@ def main() -> None:
     compilers = [in_c.compiler(name) or f"no compiler ({name}): no units" for name in ("cc", "c++")]
     where = "\n".join([machine(), *compilers, f"A: {' '.join(in_c.PLAIN_FLAGS)}", f"B: {' '.join(in_c.VECTOR_FLAGS)}"])
     print(where)
-    found = [*rows(units(effort), contenders(effort), effort.rounds), first_cell(), *two_cores(effort)]
+    found = [*rows(units(effort), contenders(effort), effort.rounds), *two_cores(effort)]
     heading("Speed and error")
     table(HEADER, found)
     publish(given, "speed", "Speed and error", where, f"{ABOUT}\n{markdown(HEADER, found)}")

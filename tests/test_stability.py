@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from solutions import solve
 
-from benchmarks import stability
 from ringsweep.models import MODELS
 from ringsweep.models.ring.record import Outcome
 from ringsweep.quantities.flags import JAMMED, OSCILLATORY, RESTING, SEPARATING
@@ -194,13 +193,3 @@ class TestEnergy:
         steps = np.array([1000, 2000, 4000])
         losses = [self.drift(cells, RK4(int(n), certify=False), "bengisu-akay", 10.0)[0] for n in steps]
         assert -np.polyfit(np.log(steps), np.log(losses), 1)[0] == pytest.approx(5.0, abs=0.3)
-
-
-def test_extreme_scenes_and_their_closed_forms_can_be_made():
-    """The benchmark takes the reference's functions: an edit there must not leave it broken."""
-    names = [extreme.name for extreme in stability.extremes()]
-    assert len(names) == len(set(names))
-    epsilon, first, second = stability._balances(0.0, 0.0, 0.0, 0.0)
-    weight = stability.BODY["mass"] * stability.GRAVITY
-    assert epsilon == 0.0
-    assert (first + second) * np.cos(stability.BETA) == pytest.approx(weight)
