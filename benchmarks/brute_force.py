@@ -623,84 +623,62 @@ def main():
 
 # The 500 scenes of the tests.
 CSV_COUNT, CSV_SEED = 500, 181
-CSV_PARAMETERS = ["amplitude", "exponent", "center", "half_angle", "rough_s", "rough_k", "rest_s", "rest_k", "alpha",
-                  "v0"]  # fmt: skip
-CSV_SCENE = ["drive", *CSV_PARAMETERS, "omega", "span"]
-CSV_OUTCOME = ["method", "regime", "motion", "contact", "t_separation", "normal_min", "agrees", "compliant"]
 
 
 def draw_csv(rng):
-    """A random scene on the paper's rig, rounded to six digits."""
+    """A random scene on the paper's rig: law of the drive, and values by path, rounded to six digits."""
 
-    def pair():
+    def pair(place):
         mu_k = rng.uniform(0.02, 0.4) * level
-        return mu_k + rng.choice([0.0, rng.uniform(0.0, 0.4)], p=[0.1, 0.9]) * level, mu_k
+        mu_s = mu_k + rng.choice([0.0, rng.uniform(0.0, 0.4)], p=[0.1, 0.9]) * level
+        return {f"friction.{place}.mu_s": mu_s, f"friction.{place}.mu_k": mu_k}
 
     # Some scenes almost without friction, so that the body revolves; some so rough that it can jam.
     level = rng.choice([0.1, 1.0, 3.0], p=[0.15, 0.8, 0.05])
-    rough, rest = pair(), pair()
+    surfaces = pair("rough") | pair("rest")
     scene = {
-        "amplitude": rng.choice([-1, 1]) * 10.0 ** rng.uniform(-1, 1.3),
-        "exponent": rng.uniform(1.1, 3.0),
-        "center": rng.choice([0.0, rng.uniform(-math.pi, math.pi)]),
-        "half_angle": rng.choice([0.0, math.pi, rng.uniform(0, math.pi)], p=[0.04, 0.04, 0.92]),
-        "rough_s": rough[0],
-        "rough_k": rough[1],
-        "rest_s": rest[0],
-        "rest_k": rest[1],
-        "alpha": 10.0 ** rng.uniform(0, 7),
-        "v0": 10.0 ** rng.uniform(-9, 0),
-        "omega": rng.choice([0.0, rng.uniform(-30, 30), rng.uniform(-120, 120)], p=[0.5, 0.35, 0.15]),
-        "span": rng.uniform(0.5, 3.0),
+        "drive.amplitude": rng.choice([-1, 1]) * 10.0 ** rng.uniform(-1, 1.3),
+        "drive.exponent": rng.uniform(1.1, 3.0),
+        "zone.center": rng.choice([0.0, rng.uniform(-math.pi, math.pi)]),
+        "zone.half_angle": rng.choice([0.0, math.pi, rng.uniform(0, math.pi)], p=[0.04, 0.04, 0.92]),
+        **surfaces,
+        "friction.alpha": 10.0 ** rng.uniform(0, 7),
+        "friction.v0": 10.0 ** rng.uniform(-9, 0),
+        "initial.omega": rng.choice([0.0, rng.uniform(-30, 30), rng.uniform(-120, 120)], p=[0.5, 0.35, 0.15]),
+        "time.span": rng.uniform(0.5, 3.0),
     }
     scene = {name: value if value == math.pi else float(f"{value:.6g}") for name, value in scene.items()}
-    return {"drive": str(rng.choice(["arctan", "power"]))} | scene
+    return str(rng.choice(["arctan", "power"])), scene
 
 
-def from_csv(values):
-    """Scene of a row of the file."""
-    number = {name: float(values[name]) for name in CSV_SCENE[1:]}
-    paths = RIG | {
-        "friction.alpha": number["alpha"],
-        "friction.v0": number["v0"],
-        "zone.center": number["center"],
-        "zone.half_angle": number["half_angle"],
-        "drive.amplitude": number["amplitude"],
-        "initial.phi": 0.0,
-        "initial.omega": number["omega"],
-        "time.span": number["span"],
-    }
-    for where in ("rough", "rest"):
-        paths |= {f"friction.{where}.mu_{letter}": number[f"{where}_{letter}"] for letter in "sk"}
-    if values["drive"] == "power":
-        paths["drive.exponent"] = number["exponent"]
-    return nest(Kind("ring", "bengisu-akay", values["drive"], 1), paths)
+def write(path, rows):
+    """Write rows, mappings with the same keys, to a file."""
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def write_csv(path):
     """Write the 500 scenes and the answers of the reference."""
-    rng = np.random.default_rng(CSV_SEED)
-    with open(path, "w", newline="") as file:
-        writer = csv.DictWriter(file, CSV_SCENE + CSV_OUTCOME, lineterminator="\n")
-        writer.writeheader()
-        for _ in tqdm(range(CSV_COUNT), disable=None):
-            values = draw_csv(rng)
-            verdict = judge(from_csv(values))
-            regime, motion, contact = verdict.kind or ("unresolved", "unresolved", 0)
-            apart, held = regime == "separating", regime in ("resting", "oscillatory", "revolving")
-            word = "held" if held else regime
-            t = verdict.runs[0]["t_least"] if held else verdict.runs[0]["t_end"]
-            outcome = {
-                "method": "radau",
-                "regime": regime,
-                "motion": motion,
-                "contact": contact,
-                "t_separation": f"{verdict.numbers['t_separation']:.8g}" if apart else "",
-                "normal_min": f"{min(verdict.runs[0]['least_1'], verdict.runs[0]['least_2']):.2g}" if held else "",
-                "agrees": int(verdict.state == "clear"),
-                "compliant": opinion(problem(from_csv(values)), word, contact, t).word,
-            }
-            writer.writerow(values | outcome)
+    rng, rows = np.random.default_rng(CSV_SEED), []
+    for _ in tqdm(range(CSV_COUNT), disable=None):
+        law, values = draw_csv(rng)
+        given = {name: value for name, value in values.items() if law == "power" or name != "drive.exponent"}
+        scene = nest(Kind("ring", "bengisu-akay", law, 1), RIG | {"initial.phi": 0.0} | given)
+        verdict = judge(scene)
+        regime, motion, contact = verdict.kind or ("unresolved", "unresolved", 0)
+        apart, held = regime == "separating", regime in ("resting", "oscillatory", "revolving")
+        first = verdict.runs[0]
+        word, t = ("held", first["t_least"]) if held else (regime, first["t_end"])
+        rows.append({
+            "drive": law, **values, "regime": regime, "motion": motion, "contact": contact,
+            "t_separation": f"{verdict.numbers['t_separation']:.8g}" if apart else "",
+            "normal_min": f"{min(first['least_1'], first['least_2']):.2g}" if held else "",
+            "agrees": int(verdict.state == "clear"),
+            "compliant": opinion(problem(scene), word, contact, t).word,
+        })  # fmt: skip
+    write(path, rows)
 
 
 #: Scenes with impacts of the tests, which share one compiled kernel.
@@ -724,10 +702,7 @@ def write_impacts(path):
         regime, _, contact, word = verdict.kind
         numbers = {name: f"{value:.9g}" for name, value in numbers.items()}
         rows.append(values | {"regime": regime, "contact": contact, "aftermath": word} | numbers)
-    with open(path, "w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write(path, rows)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,13 @@
-"""Whether words and exponents of long runs of a forced belt are right, in random scenes.
+"""Whether words of long runs of a forced belt are right, in random scenes.
 
     python -m benchmarks.long_runs [--count 2000] [--seed 30]
 
 The scenes are those of the family `belt forced` of :mod:`benchmarks.brute_force`: stiction, Coulomb and Tustin
-friction, belts that move or stand still, linear and stiffening springs, forces around resonance. It prints two tables:
-
-- **words**: each scene runs over 300, 617 and 1000 periods of the force. Of the certified runs that are `settled` at
-  300 periods, how many keep `long_run`, `period` and `regime` in the longer runs? A judgement of its own takes the last
-  128 points of the longest run, one per period of the force: the motion has the period n if each point is where the
-  n-th before it was. It shares the integration with the package, but not its evidence.
-- **exponents**: the largest Lyapunov exponent of a tenth of the scenes, times the period, against pairs of neighbouring
-  runs, brought together again after each period of the force. Where stick erases the past, the pair meets, and the
-  exponent is minus infinity.
+friction, belts that move or stand still, linear and stiffening springs, forces around resonance. Each scene runs over
+300, 617 and 1000 periods of the force. Of the certified runs that are `settled` at 300 periods, how many keep
+`long_run`, `period` and `regime` in the longer runs? A judgement of its own takes the last 128 points of the longest run,
+one per period of the force: the motion has the period n if each point is where the n-th before it was. It shares the
+integration with the package, but not its evidence. `tests/test_exponent.py` compares exponents with neighbouring runs.
 
 Writes `long_runs.md`.
 """
@@ -34,9 +30,6 @@ COUNT, QUICK, SEED = 2000, 90, 30
 #: Points of the judgement, the longest period that it looks for, in periods of the force, and distance of points that
 #: are the same, in ranges of all points.
 KEPT, LONGEST, SAME = 128, 32, 1e-3
-#: Periods of the force of a pair of runs, those left out at first, distance of the pair, and greatest difference of
-#: exponents times the period beside three standard errors.
-PAIRED, SETTLING, DISTANCE, TOLERANCE = 160, 40, 1e-7, 0.02
 
 Points = dict[str, np.ndarray]
 
@@ -106,43 +99,6 @@ def words(kind: Any, points: Points, period: np.ndarray, tally: Counter[str]) ->
     return lines
 
 
-def exponents(kind: Any, points: Points, period: np.ndarray, tally: Counter[str]) -> list[str]:
-    """Compare exponents with pairs of neighbouring runs; returns a line for each that differs."""
-    found = run(kind, points | {"time.span": PAIRED * period}, exponent=True)
-    both = {path: np.tile(column, 2) for path, column in points.items()} | {"time.span": np.tile(period, 2)}
-    state = np.array([points["initial.x"], points["initial.velocity"]])
-    apart = np.full((2, len(period)), DISTANCE)
-    growth = np.zeros((PAIRED, len(period)))
-    for k in range(PAIRED):
-        both["initial.x"], both["initial.velocity"] = np.hstack([state, state + apart])
-        ends = run(kind, both)
-        reached = np.array([ends["x_end"].values, ends["velocity_end"].values])
-        state, apart = reached[:, : len(period)], reached[:, len(period) :] - reached[:, : len(period)]
-        length = np.hypot(apart[0] * 2.0 * np.pi / period, apart[1])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            growth[k], apart = np.log(length / DISTANCE), apart / length * DISTANCE
-        # Where the pair has met, another one starts.
-        apart = np.where(length > 0.0, apart, DISTANCE)
-    used = growth[SETTLING:]
-    ours, error = found["lyapunov"].values * period, found["lyapunov_error"].values * period
-    lines = []
-    for k in range(len(period)):
-        tally["exponents"] += 1
-        met = ~np.isfinite(used[:, k]) | (used[:, k] < np.log(1e-6))
-        if np.isneginf(ours[k]) or met.any():
-            word = "both erase" if np.isneginf(ours[k]) and met.any() else "one erases"
-            tally[word] += 1
-            if word == "one erases":
-                lines.append(f"{word}: {ours[k]:.3g}, pairs met in {met.sum()} of {len(met)} periods")
-            continue
-        mean, scatter = used[:, k].mean(), np.hypot(used[:, k].std() / np.sqrt(len(used)), error[k])
-        agrees = abs(ours[k] - mean) <= 3.0 * scatter + TOLERANCE
-        tally["agree" if agrees else "differ"] += 1
-        if not agrees:
-            lines.append(f"{ours[k]:.4g} and {mean:.4g} +- {scatter:.2g}: {kind.law}, {scene_of(points, k)}")
-    return lines
-
-
 def scene_of(points: Points, k: int) -> dict[str, float]:
     """Numbers of one scene by paths."""
     return {path: float(column[k]) for path, column in points.items()}
@@ -150,7 +106,6 @@ def scene_of(points: Points, k: int) -> dict[str, float]:
 
 WORDS = ["scenes", "not settled", "not certified", "settled", "other long_run", "other period", "other regime",
          "other own judgement"]  # fmt: skip
-EXPONENTS = ["exponents", "agree", "both erase", "one erases", "differ"]
 
 
 def main() -> None:
@@ -169,19 +124,12 @@ def main() -> None:
         points, period = scenes(kind, count, np.random.default_rng([given.seed, k]))
         for line in words(kind, points, period, tally):
             print(line)
-        few = max(count // 10, 1)
-        for line in exponents(kind, {path: column[:few] for path, column in points.items()}, period[:few], tally):
-            print(line)
     seconds = perf_counter() - begin
-    body = ""
-    for title, names in (
-        ("Words over 300, 617 and 1000 periods", WORDS),
-        ("Exponents against pairs of runs", EXPONENTS),
-    ):
-        row = [[str(tally[name]) for name in names]]
-        _common.heading(title)
-        _common.table(names, row)
-        body += f"## {title}\n\n{_common.markdown(names, row)}\n"
+    title = "Words over 300, 617 and 1000 periods"
+    row = [[str(tally[name]) for name in WORDS]]
+    _common.heading(title)
+    _common.table(WORDS, row)
+    body = f"## {title}\n\n{_common.markdown(WORDS, row)}\n"
     settled = ", ".join(f"{n} {word[3:]}" for word, n in sorted(tally.items()) if word.startswith("as "))
     body += f"Settled: {settled}. {seconds:.0f} s, seed {given.seed}.\n"
     print(settled)

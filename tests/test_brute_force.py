@@ -14,20 +14,6 @@ from tiers import mostly_slow
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.solvers.event import Auto
 
-PATHS = {
-    "amplitude": "drive.amplitude",
-    "center": "zone.center",
-    "half_angle": "zone.half_angle",
-    "rough_s": "friction.rough.mu_s",
-    "rough_k": "friction.rough.mu_k",
-    "rest_s": "friction.rest.mu_s",
-    "rest_k": "friction.rest.mu_k",
-    "alpha": "friction.alpha",
-    "v0": "friction.v0",
-    "omega": "initial.omega",
-    "span": "time.span",
-}
-
 
 @pytest.fixture(scope="module")
 def scenes():
@@ -43,15 +29,15 @@ def column(rows, name):
 def both(request, scenes, cells):
     """Scenes of one drive, and the outcomes of `auto` for them, in one batch."""
     rows = [row for row in scenes if row["drive"] == request.param]
-    paths = PATHS | ({"exponent": "drive.exponent"} if request.param == "power" else {})
-    batch = cells({path: column(rows, name) for name, path in paths.items()}, drive=request.param)
+    paths = [name for name in rows[0] if "." in name and (request.param == "power" or name != "drive.exponent")]
+    batch = cells({path: column(rows, path) for path in paths}, drive=request.param)
     return rows, solve(Auto(), batch)
 
 
 def test_scenes_cover_all_regimes_and_the_ranges_of_v0_and_alpha(scenes):
     assert len(scenes) == 500
     assert {row["regime"] for row in scenes} == {"resting", "oscillatory", "revolving", "separating", "jammed"}
-    v0, alpha = column(scenes, "v0"), column(scenes, "alpha")
+    v0, alpha = column(scenes, "friction.v0"), column(scenes, "friction.alpha")
     assert (v0.min() < 2e-9, v0.max() > 0.5, alpha.min() < 2, alpha.max() > 5e6) == (True,) * 4
     # Brute force is clear about each scene: its runs agree, and no contact that held came close to separation.
     assert all(row["agrees"] == "1" for row in scenes)
@@ -61,7 +47,7 @@ def test_scenes_cover_all_regimes_and_the_ranges_of_v0_and_alpha(scenes):
 def test_a_body_on_compliant_contacts_contradicts_no_end_of_brute_force(scenes):
     """It decides wherever the law is not so steep at rest that friction changes faster than springs ring."""
     assert {row["compliant"] for row in scenes} <= {"confirmed", "undecided"}
-    gentle = [row for row in scenes if float(row["v0"]) > 1e-3 and float(row["alpha"]) < 1e3]
+    gentle = [row for row in scenes if float(row["friction.v0"]) > 1e-3 and float(row["friction.alpha"]) < 1e3]
     assert len(gentle) > 30
     assert {row["compliant"] for row in gentle} == {"confirmed"}
 
