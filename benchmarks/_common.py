@@ -168,6 +168,13 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in (header, rule, *rows))
 
 
+def shown(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Print a table under its title; the same table in Markdown."""
+    heading(title)
+    table(header, rows)
+    return markdown(header, rows)
+
+
 def machine(also: Sequence[str] = ()) -> str:
     """Processor, cores and load of this machine, and versions of the packages, with those named in `also`."""
     info = Path("/proc/cpuinfo")

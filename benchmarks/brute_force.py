@@ -604,17 +604,12 @@ def main():
             if k == len(chosen[name]) - 1:
                 tqdm.write(" | ".join(row(name, counts[name])))
     rows = [row(name, count) for name, count in (counts | {"all": total} if len(counts) > 1 else counts).items()]
-    _common.heading("Certified answers against an independent reference")
-    _common.table(HEADER, rows)
-    _common.heading("Certified ends, and what a body on compliant contacts says of them")
-    _common.table(END_HEADER, end_rows(total.ends))
+    title, ends = "Certified answers against an independent reference", "What a body on springs says of certified ends"
+    said = _common.shown(title, HEADER, rows), _common.shown(ends, END_HEADER, end_rows(total.ends))
     cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
     print(f"CPU of all cores: {cost} (compilation included), seed {arguments.seed}")
     if len(chosen) == 1 or not arguments.families:
-        text = f"Seed {arguments.seed}; {cost}.\n\n{_common.markdown(HEADER, rows)}"
-        text += "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
-        text += _common.markdown(END_HEADER, end_rows(total.ends))
-        title = "Certified answers against an independent reference"
+        text = f"Seed {arguments.seed}; {cost}.\n\n{said[0]}\n## {ends}\n\n{said[1]}"
         name = "brute_force" if len(chosen) > 1 else f"brute_force_{next(iter(chosen)).replace(' ', '_')}"
         runs = f"{total.tally['runs']:,}".replace(",", " ")
         figures = {"runs": runs, "contradictions": str(total.tally["contradicted"])}

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from benchmarks._common import command, heading, machine, markdown, one_core, publish, table
+from benchmarks._common import command, machine, one_core, publish, shown
 from benchmarks.brute_force import Kind, answers, draw, nest, scales
 from ringsweep.physics.friction import LAWS, SetValued, family_of
 from ringsweep.solvers.event import Event, Implicit
@@ -35,15 +35,10 @@ KINDS = {
     "ring, `bengisu-akay`": Kind("ring", "bengisu-akay", "arctan", 1),
     "ring, `lugre`": Kind("ring", "lugre", "arctan", 1),
     "ring, `stiction`, with impacts": Kind("ring", "stiction", "arctan", 1, impact=True),
-    "belt, `stiction`": Kind("belt", "stiction", ""),
-    "belt, `tustin`": Kind("belt", "tustin", ""),
-    "belt, `threlfall`": Kind("belt", "threlfall", ""),
-    "belt, `bengisu-akay`": Kind("belt", "bengisu-akay", ""),
-    "belt, `dahl`": Kind("belt", "dahl", ""),
-    "belt, `lugre`": Kind("belt", "lugre", ""),
-    "belt, `elasto-plastic`": Kind("belt", "elasto-plastic", ""),
-    "belt, `reset-integrator`": Kind("belt", "reset-integrator", ""),
 }
+KINDS |= {f"belt, `{law}`": Kind("belt", law, "") for law in (
+    "stiction", "tustin", "threlfall", "bengisu-akay", "dahl", "lugre", "elasto-plastic", "reset-integrator",
+)}  # fmt: skip
 HEADER = ["scenes", "method", "default `rtol`", "median error", "99 %", "largest", "bounds", "covered", "stated/true"]
 
 
@@ -75,15 +70,8 @@ def measure(title: str, kind: Kind, count: int) -> list[str]:
     ratios = ratios[~np.isnan(ratios)]
     each = (f"{value:.0e}" for value in (np.median(errors), np.quantile(errors, 0.99), errors.max()))
     covered = f"{100.0 * (ratios >= 1.0).mean():.1f} %"
-    return [
-        title,
-        f"`{method.name}`",
-        f"{method.rtol:.0e}",
-        *each,
-        str(len(ratios)),
-        covered,
-        f"{np.median(ratios):.0f}",
-    ]
+    bounded = str(len(ratios)), covered, f"{np.median(ratios):.0f}"
+    return [title, f"`{method.name}`", f"{method.rtol:.0e}", *each, *bounded]
 
 
 def ratios_of(found: xr.Dataset, exact: xr.Dataset, name: str) -> np.ndarray:
@@ -105,9 +93,8 @@ def main() -> None:
         for title, kind in KINDS.items():
             rows.append(measure(title, kind, QUICK if given.quick else COUNT))
             print(*rows[-1], flush=True)
-    heading("Errors at the default tolerances, and bounds")
-    table(HEADER, rows)
-    publish(given, "errors", "Errors at the default tolerances, and bounds", where, markdown(HEADER, rows))
+    title = "Errors at the default tolerances, and bounds"
+    publish(given, "errors", title, where, shown(title, HEADER, rows))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ import numpy as np
 import xarray as xr
 
 import ringsweep
-from benchmarks._common import PAPER_STEPS, SPAN, command, family, heading, machine, markdown, publish, table
+from benchmarks._common import PAPER_STEPS, SPAN, command, family, machine, publish, shown
 from ringsweep import config
 
 MAP = Path(__file__).parents[1] / "configs" / "regime_map.yaml"
@@ -61,20 +61,14 @@ def main() -> None:
         ds = run(scene, solver)
         share = shares(ds, "regime")
         rows.append([title, *(percent(share.get(n, 0.0)) for n in header[1:3]), percent(float(ds.certified.mean()))])
-    heading("The map")
-    table(header, rows)
+    shares_of_map = shown("The map", header, rows)
 
     found = []
     for step in STEPS:
-        ds = ringsweep.sweep(
-            scene,
-            {"drive.amplitude": ["2 rad/s"]},
-            solver={"method": "rk4", "steps": round(SPAN / step)},
-            progress=False,
-        )
+        solver = {"method": "rk4", "steps": round(SPAN / step)}
+        ds = ringsweep.sweep(scene, {"drive.amplitude": ["2 rad/s"]}, solver=solver, progress=False)
         found.append([f"{step:g} s".replace("e-0", "e-"), str(ringsweep.words(ds.regime).values[0])])
-    heading("The run, by rk4")
-    table(["step", "regime"], found)
+    by_step = shown("The run, by rk4", ["step", "regime"], found)
     finds = [regime == "separating" for _, regime in found]
     missing, least = found[finds.index(True) - 1][0], found[finds.index(True)][0]
 
@@ -89,19 +83,18 @@ def main() -> None:
     # The first round compiles.
     ratio, word = float(np.median(ratios[1:])), shares(after, "aftermath")
     aftermath = [[name, percent(word.get(name, 0.0))] for name in ("held", "recovered", "open", "tumbled")]
-    heading(f"With a restitution of 0.5: {ratio:.2f} times the CPU seconds")
-    table(["aftermath", "share"], aftermath)
+    words = shown(f"With a restitution of 0.5: {ratio:.2f} times the CPU seconds", ["`aftermath`", "share"], aftermath)
 
     body = f"""
-{markdown(header, rows)}
+{shares_of_map}
 By `rk4`, the single run ends so; by `auto` contact 2 separates:
 
-{markdown(["step", "regime"], found)}
+{by_step}
 With a coefficient of restitution of 0.5 the map takes {ratio:.2f} times the CPU seconds, and
 {percent(float(after.certified.mean()))} of the cells are certified:
 
-{markdown(["`aftermath`", "share"], aftermath)}"""
-    figures = {"map": markdown(header, rows), "misses": missing, "finds": least}
+{words}"""
+    figures = {"map": shares_of_map, "misses": missing, "finds": least}
     publish(given, "first_page", "The map of the first page", where, body, figures)
 
 

@@ -5,9 +5,9 @@
 The scenes are those of the family `belt forced` of :mod:`benchmarks.brute_force`: stiction, Coulomb and Tustin
 friction, belts that move or stand still, linear and stiffening springs, forces around resonance. Each scene runs over
 300, 617 and 1000 periods of the force. Of the certified runs that are `settled` at 300 periods, how many keep
-`long_run`, `period` and `regime` in the longer runs? A judgement of its own takes the last 128 points of the longest run,
-one per period of the force: the motion has the period n if each point is where the n-th before it was. It shares the
-integration with the package, but not its evidence. `tests/test_exponent.py` compares exponents with neighbouring runs.
+`long_run`, `period` and `regime` in the longer runs? A judgement of its own takes the last 128 points of the longest
+run, one per period of the force: the motion has the period n if each point is where the n-th before it was. It shares
+the integration with the package, but not its evidence.
 
 Writes `long_runs.md`.
 """
@@ -126,10 +126,7 @@ def main() -> None:
             print(line)
     seconds = perf_counter() - begin
     title = "Words over 300, 617 and 1000 periods"
-    row = [[str(tally[name]) for name in WORDS]]
-    _common.heading(title)
-    _common.table(WORDS, row)
-    body = f"## {title}\n\n{_common.markdown(WORDS, row)}\n"
+    body = f"## {title}\n\n{_common.shown(title, WORDS, [[str(tally[name]) for name in WORDS]])}\n"
     settled = ", ".join(f"{n} {word[3:]}" for word, n in sorted(tally.items()) if word.startswith("as "))
     body += f"Settled: {settled}. {seconds:.0f} s, seed {given.seed}.\n"
     print(settled)

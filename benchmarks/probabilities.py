@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 import ringsweep
-from benchmarks._common import command, heading, machine, markdown, publish, ring, table
+from benchmarks._common import command, machine, publish, ring, shown
 from ringsweep.quantities.flags import REGIMES
 
 N, SPREAD = 256, 0.05
@@ -117,10 +117,10 @@ def main() -> None:
         _, _, measured, full, quick = MEASURED[given.way]
         measured(2)
         begin = perf_counter()
-        found = measured(quick if given.quick else full)
+        result = measured(quick if given.quick else full)
         seconds = perf_counter() - begin
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-        print(json.dumps({"seconds": seconds, "memory": memory, "found": found.tolist()}))
+        print(json.dumps({"seconds": seconds, "memory": memory, "found": result.tolist()}))
         return
     print(where := machine())
     rows: list[list[str]] = []
@@ -135,8 +135,8 @@ def main() -> None:
             [number, way, f"{side} x {side}", f"{runs}", f"{told['seconds']:.0f} s", f"{told['memory']:.0f} MB"]
         )
     header = ["number", "way", "cells", "runs", "time, one job", "greatest memory"]
-    heading("Maps of probabilities and of Sobol indices")
-    table(header, rows)
+    title = "Maps of probabilities and of Sobol indices"
+    found = shown(title, header, rows)
     apart = " ".join(
         f"The {number} of both ways differ by {np.nanmedian(np.abs(a - b)):.3f} in the median and by"
         f" {np.nanmax(np.abs(a - b)):.3f} at most."
@@ -145,13 +145,7 @@ def main() -> None:
     apart = f"n = {N} in each cell; both ways have points of their own. {apart} Indices are compared in"
     apart += " cells where 10 to 90 % of the runs separate."
     print(apart)
-    publish(
-        given,
-        "probabilities",
-        "Maps of probabilities and of Sobol indices",
-        where,
-        f"{markdown(header, rows)}\n{apart}",
-    )
+    publish(given, "probabilities", title, where, f"{found}\n{apart}")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ import numpy as np
 import xarray as xr
 
 import ringsweep
-from benchmarks._common import ALPHA, V0, command, heading, machine, markdown, publish, ring, table
+from benchmarks._common import ALPHA, V0, command, machine, publish, ring, shown
 from ringsweep.quantities.variables import INFERRED, LABELS
 
 SCENE = ring({"law": "bengisu-akay", "alpha": ALPHA, "v0": V0})
@@ -65,9 +65,7 @@ def against_full(sides: list[int], folder: str) -> str:
         print(*rows[-1], flush=True)
     header = ["map", "refined, full", "cells run", "wall clock", "CPU", "cells wrong", "of those inferred",
               "bound on these", "the others equal bit for bit"]  # fmt: skip
-    heading("Refined against full")
-    table(header, rows)
-    return "## Refined against full\n\n" + markdown(header, rows)
+    return "## Refined against full\n\n" + shown("Refined against full", header, rows)
 
 
 def scaling(sides: list[int], folder: str) -> str:
@@ -83,11 +81,10 @@ def scaling(sides: list[int], folder: str) -> str:
         found.close()
         print(*rows[-1], flush=True)
     header = ["side", "wall, s", "CPU, s", "cells run", "per cell of the side", "share", "an audit of 2 % adds"]
-    heading("Cost against resolution, without an audit")
-    table(header, rows)
+    title = "Cost against resolution, without an audit"
+    found = shown(title, header, rows)
     slope = np.polyfit(np.log(sides), np.log(cells), 1)[0]
-    text = "## Cost against resolution, without an audit\n\n" + markdown(header, rows)
-    return f"{text}\nCells run grow like side^{slope:.2f}.\n"
+    return f"## {title}\n\n{found}\nCells run grow like side^{slope:.2f}.\n"
 
 
 def main() -> None:

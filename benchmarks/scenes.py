@@ -36,12 +36,10 @@ from benchmarks._common import (
     bare,
     command,
     configure,
-    heading,
     machine,
-    markdown,
     one_core,
     publish,
-    table,
+    shown,
 )
 from ringsweep.physics.friction import LAWS, SetValued, coefficients_of, family_of
 from ringsweep.solvers import automaton, rk4
@@ -326,9 +324,7 @@ def main() -> None:
         sections.append((LEFT_OUT, ["scene", "method", *OPTIONAL], parts))
     report = ABOUT
     for title, header, rows in sections:
-        heading(title)
-        table(header, rows)
-        report += f"\n## {title}\n\n{markdown(header, rows)}"
+        report += f"\n## {title}\n\n{shown(title, header, rows)}"
     publish(given, "scenes", "The cost of each thing in a scene", where, report)
 
 

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from benchmarks._common import command, heading, machine, markdown, publish, ring, table
+from benchmarks._common import command, machine, publish, ring, shown
 
 #: Values along each of the five axes.
 SIDES = (6, 10, 16)
@@ -96,24 +96,15 @@ def main() -> None:
                 f"{picture.wall:.1f}", f"{picture.memory / 2**20:.0f}",
             ])  # fmt: skip
             print(*rows[-1], flush=True)
-    header = [
-        "cells",
-        "s",
-        "cells/s",
-        "CPU µs per cell",
-        "memory, MiB",
-        "bytes per cell",
-        "one map, s",
-        "its memory, MiB",
-    ]
-    heading("Size of a sweep over five axes")
-    table(header, rows)
+    header = ["cells", "s", "cells/s", "CPU µs per cell", "memory, MiB", "bytes per cell"]
+    header += ["one map, s", "its memory, MiB"]
+    found = shown("Size of a sweep over five axes", header, rows)
     about = f"""
 A grid over five axes, 2 s under stiction for each cell, with certificates, from start to finished file. A sweep of
 {3**5} cells takes {start.wall:.1f} s and {start.memory / 2**20:.0f} MiB; rates count only the time beyond that.
 
 """
-    publish(given, "sizes", "Size of a sweep", where, about + markdown(header, rows))
+    publish(given, "sizes", "Size of a sweep", where, about + found)
 
 
 if __name__ == "__main__":

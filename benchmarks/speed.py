@@ -38,13 +38,11 @@ from benchmarks._common import (
     command,
     configure,
     family,
-    heading,
     machine,
-    markdown,
     one_core,
     publish,
     ring,
-    table,
+    shown,
 )
 from benchmarks.peers import in_c
 from benchmarks.work_precision import SCENES
@@ -258,9 +256,7 @@ def main() -> None:
     where = "\n".join([machine(), *compilers, f"A: {' '.join(in_c.PLAIN_FLAGS)}", f"B: {' '.join(in_c.VECTOR_FLAGS)}"])
     print(where)
     found = [*rows(units(effort), contenders(effort), effort.rounds), *two_cores(effort)]
-    heading("Speed and error")
-    table(HEADER, found)
-    publish(given, "speed", "Speed and error", where, f"{ABOUT}\n{markdown(HEADER, found)}")
+    publish(given, "speed", "Speed and error", where, f"{ABOUT}\n{shown('Speed and error', HEADER, found)}")
 
 
 #: Explanation at the head of the report.
