@@ -14,6 +14,7 @@ from xdist.scheduler import LoadScopeScheduling
 from ringsweep.config import load
 from ringsweep.models import MODELS, batch, parameters
 from ringsweep.models.scene import Structure
+from ringsweep.runs import task_sizes
 from ringsweep.solvers.rk4 import RK4
 
 settings.register_profile("ringsweep", deadline=None, derandomize=True)
@@ -23,6 +24,11 @@ settings.load_profile("ringsweep")
 def pytest_configure(config: pytest.Config) -> None:
     """Let tests interrupt themselves: a shell starts processes in the background with interrupts ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Let the tasks of each test begin with one cell, whatever ran before it."""
+    task_sizes._known.clear()
 
 
 class ByFile(LoadScopeScheduling):

@@ -337,6 +337,7 @@ def test_a_sampled_sweep_that_is_stopped_goes_on_bit_for_bit(tmp_path: Any, monk
         return compute(*args)
 
     monkeypatch.setattr(sampled, "compute_parts", fail_later)
+    monkeypatch.setattr("ringsweep.runs.task_sizes.TaskSizes.max_cells", 1)
     with pytest.raises(RuntimeError):
         run(given, tmp_path / "part.nc")
     assert list((tmp_path / "part.nc.partial").glob("*.npz"))

@@ -201,7 +201,6 @@ class TestContinuation:
             return replace(compute_task(*arguments), seconds=None)
 
         monkeypatch.setattr("ringsweep.runs.sweep.compute_task", interrupted)
-        monkeypatch.setattr("ringsweep.runs.task_sizes._known", {})
         assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc"), "--jobs", "1"]) == 130
         assert "stopping when compilation and the first cells are done" in caplog.text
 
