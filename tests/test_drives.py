@@ -89,7 +89,7 @@ class TestCourse:
         course = self.course(drive, t, 1e-3)
         times = t + np.linspace(0.0, 1.0, 23) * min(course[0, 1], 0.1)
         exact = np.array([[*turn(drive, time), jerk(drive, time)] for time in times])
-        found = np.array([turn_near(drive, course, time) for time in times])
+        found = np.array([turn_near(drive, course, time, 0.0) for time in times])
         # The drive itself is as uncertain as its time.
         largest = abs(exact).max(axis=0)
         allowed = 4e-15 * largest[:3] + 4e-16 * t * largest[1:]
@@ -98,7 +98,7 @@ class TestCourse:
     def test_drive_itself_is_taken_where_the_series_does_not_reach(self, drive):
         course = self.course(drive, 1.0, 1e-3)
         for t in (0.2, 0.999999, 1.0 + 2.0 * course[0, 1] if course[0, 1] < inf else 0.5):
-            assert turn_near(drive, course, t) == turn(drive, t)
+            assert turn_near(drive, course, t, 0.0) == turn(drive, t)
 
     def test_series_is_kept_while_it_reaches(self, drive):
         course = self.course(drive, 1.2, 1e-6)

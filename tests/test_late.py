@@ -9,7 +9,7 @@ import xarray as xr
 from belts import with_all_parts
 
 import ringsweep
-from ringsweep.numerics.clock import Instant, later, phase
+from ringsweep.numerics.clock import Instant, later, phase, shifted_phase
 from ringsweep.quantities.flags import REGIMES
 
 STICTION = {"law": "stiction", "mu_s": 0.07, "mu_k": 0.05}
@@ -56,6 +56,17 @@ class TestClock:
             turns = Fraction(frequency) * (Fraction(t) + Fraction(rest))
             within = float(turns - round(turns))
             assert cos(phase(frequency, t, rest, start)) == pytest.approx(cos(2.0 * pi * within + start), abs=2e-15)
+
+    def test_phase_since_a_late_instant_does_not_depend_on_the_instant(self):
+        """Nor does it jump from one rounding to the next if the phase at t = 0 has many turns."""
+        rng = np.random.default_rng(3)
+        turns_of_start = phase(97.0, 0.0, 0.0, 2.0 * pi * 2.0**33)
+        for since in 10.0 ** rng.uniform(-12.0, 1.0, 200):
+            exact = cos(2.0 * pi * 97.0 * since)
+            late = later(Instant(2.0**30, 0.0), since)
+            assert cos(shifted_phase(97.0, late.t, late.rest, -(2.0**30), 0.0)) == pytest.approx(exact, abs=2e-12)
+            turns = phase(97.0, since, 0.0, 2.0 * pi * 2.0**33) - phase(97.0, since, 0.0, 0.0)
+            assert turns == pytest.approx(turns_of_start, abs=1e-14)
 
 
 class TestForcedBelts:
@@ -156,3 +167,39 @@ def test_angle_on_a_rocking_ring_repeats_to_rounding_after_ten_thousand_periods(
     assert (found.certified == 1).all()
     assert (found.stick_time > 100.0).all()
     np.testing.assert_allclose(found.phi_end[1:], found.phi_end[0], rtol=1e-13)
+
+
+PULSE = "F*(tanh((t - t0)/w) - tanh((t - t0)/w - 3))*cos(2*pi*f*(t - t0))"
+BRISTLES = {"law": "lugre", "mu_s": 0.15, "mu_k": 0.1, "v_s": 1e-2, "sigma0": 1e4, "sigma1": 30.0, "sigma2": 0.01}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [{"law": "tanh", "mu_k": 0.1, "v0": 1e-2}, BRISTLES], ids=lambda law: law["law"])
+class TestLateImplicitSteps:
+    """A fast pulse moves a body that has rested for up to thirty years, as it moves one that has just been launched."""
+
+    LATE = np.array([2.0, 2.0**30])
+
+    @staticmethod
+    def assert_alike(found, names):
+        assert (found.certified == 1).all()
+        assert found.steps[1] < 1.5 * found.steps[0]
+        for name in names:
+            bound = found[f"{name}_error"].sum()
+            assert abs(found[name][1] - found[name][0]) <= bound, name
+            assert bound < 0.1 * abs(found[names[0]]).max() or name.endswith("_end"), name
+
+    def test_belt_force(self, friction):
+        of = forced(friction, frequency=1.0, gravity=10.0)
+        of["force"] = {"formula": PULSE, "F": 30.0, "f": 100.0, "t0": 1.0, "w": 0.05}
+        found = runs(of, {"force.t0": self.LATE, "time.span": self.LATE + 1.0})
+        self.assert_alike(found, ("velocity_max", "x_max", "x_end", "velocity_end"))
+
+    def test_ring_drive(self, friction):
+        rest = {name: value for name, value in friction.items() if name.startswith("mu_")}
+        friction = {name: value for name, value in friction.items() if name not in rest} | {"rest": rest}
+        of = {"model": "ring-single-contact", "body": {"mass": 1.0}, "ring": {"radius": 1.0}, "gravity": 10.0}
+        drive = {"law": "formula", "theta": PULSE, "F": 0.1, "f": 100.0, "t0": 1.0, "w": 0.05}
+        of |= {"friction": friction, "drive": drive, "time": {"span": 1.0}}
+        found = runs(of, {"drive.t0": self.LATE, "time.span": self.LATE + 1.0})
+        self.assert_alike(found, ("omega_max", "phi_max", "phi_end", "omega_end"))

@@ -120,7 +120,7 @@ def _linearise(scene, mode, common, t, forcing, x):
     acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
     by_place, by_v, by_drive = acceleration_slopes(scene, now)
     by_force = force_rate(scene.drive, forcing) / scene.body.mass
-    by_time = by_place * forcing[1] + by_drive * forcing[2] + by_force - radius * drives.jerk(scene.drive, t)
+    by_time = by_place * forcing[1] + by_drive * forcing[2] + by_force - radius * drives.jerk_at(scene.drive, t)
     return (
         joined((now.place_rate, radius * (acceleration - forcing[2])), deflection_rates(now.bristles)),
         (0.0, 1.0 / radius, by_place, by_v),

@@ -66,4 +66,13 @@ def phase(frequency, t, rest, start):
     c, d = frequency - a, t - b
     # What rounding has taken from the product.
     error = ((a * b - turns) + a * d + c * b) + c * d
+    # A sum with many turns in `start` would be rounded to what they resolve, differently at each time.
+    start -= 2.0 * pi * nearest(start / (2.0 * pi))
     return 2.0 * pi * ((turns - nearest(turns)) + (error + frequency * rest)) + start
+
+
+@absorbed
+def shifted_phase(frequency, t, rest, shift, start):
+    """What :func:`phase` returns, but the time is that of :func:`phase` and `shift`, s."""
+    now = later(Instant(t, rest), shift)
+    return phase(frequency, now.t, now.rest, start)

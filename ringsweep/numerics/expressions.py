@@ -225,16 +225,28 @@ def substitute(a: Node, values: Mapping[Node, Node]) -> Node:
     return visit(a)
 
 
-def frequency(angle: Node) -> tuple[Node, Node] | None:
-    """Turns per unit of the variable of an angle that grows uniformly, and the angle at zero; None of another angle."""
+def frequency(angle: Node) -> tuple[Node, Node, Node] | None:
+    """An angle that grows uniformly, as turns per unit of the variable; None of another angle.
+
+    Returns
+    -------
+    tuple of Node
+        The turns; what the expression adds to the time itself, as the instant in ``t - t0``; and the angle where the
+        time is zero with that added.
+    """
     rate = derivative(angle)
     if rate.varies or any(node.kind == "switch" for node in nodes_of(angle)):
         return None
-    turn, at_zero = number(2.0 * math.pi), substitute(angle, {SPEED: ZERO, TIME: ZERO})
+    shift, zeros = ZERO, {SPEED: ZERO, TIME: ZERO}
+    shifted = [node for node in nodes_of(angle) if TIME in node.parts]
+    if len(shifted) == 1 and shifted[0].kind == "add":
+        shift = next(part for part in shifted[0].parts if part is not TIME)
+        zeros[shifted[0]] = ZERO
+    turn, start = number(2.0 * math.pi), substitute(angle, zeros)
     # 2 pi f gives f itself, not its rounding.
     if rate.kind == "multiply" and rate.parts[0].kind == "number":
-        return multiply(divide(rate.parts[0], turn), rate.parts[1]), at_zero
-    return divide(rate, turn), at_zero
+        return multiply(divide(rate.parts[0], turn), rate.parts[1]), shift, start
+    return divide(rate, turn), shift, start
 
 
 def rebuilt(node: Node, parts: list[Node]) -> Node:

@@ -20,6 +20,7 @@ from functools import cache, partial
 from ringsweep.numerics.expressions import (
     ONE,
     TIME,
+    ZERO,
     Node,
     add,
     derivative,
@@ -77,8 +78,11 @@ class _Writer:
             return "now" if node is TIME else str(node.value)
         if node.kind in ("sin", "cos") and (turning := frequency(node.parts[0])) is not None:
             _straight(self, list(turning))
-            turns, start = (self.known[part] for part in turning)
-            return self.new(f"{node.kind}_of(phase({turns}, now, rest, {start}))")
+            turns, shift, start = (self.known[part] for part in turning)
+            call = (
+                f"phase({turns}, now, rest, " if turning[1] is ZERO else f"shifted_phase({turns}, now, rest, {shift}, "
+            )
+            return self.new(f"{node.kind}_of({call}{start}))")
         parts = [self.known[part] for part in node.parts]
         if node.kind in _OPERATORS:
             text = f" {_OPERATORS[node.kind]} ".join(parts)

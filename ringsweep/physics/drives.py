@@ -316,6 +316,12 @@ def jerk(drive, t):
     """
 
 
+@inlined
+def jerk_at(drive, t):
+    """What :func:`jerk` returns, at a time `t` that is a number or an :class:`ringsweep.numerics.clock.Instant`."""
+    return jerk(drive, known_to(drive, t))
+
+
 @jerk.implements(Power)
 def _power_jerk(drive, t):
     n = drive.exponent
@@ -331,18 +337,19 @@ def _table_jerk(drive, t):
 COURSE_ORDER = 12
 
 #: Shape of a course: its first row holds the centre and the reach of such a series, s, then the coefficients of
-#: :func:`expand`; the others are scratch.
-COURSE_SHAPE = 1 + writer.SERIES_ROWS, COURSE_ORDER + 3
+#: :func:`expand`, and what rounding takes from the centre; the others are scratch.
+COURSE_SHAPE = 1 + writer.SERIES_ROWS, COURSE_ORDER + 4
 
 
 @inlined
 def new_course(course):
     """Empty a course, so that a run depends on no other run."""
     course[0, 0] = course[0, 1] = inf
+    course[0, COURSE_ORDER + 3] = 0.0
 
 
 @inlined
-def follow(drive, course, t, h):
+def follow(drive, course, now, h):
     """Prepare a course for a step: :func:`turn_near` then takes the series at most times of the step, if it converges.
 
     Parameters
@@ -350,16 +357,27 @@ def follow(drive, course, t, h):
     drive : NamedTuple
     course : ndarray of shape ``COURSE_SHAPE``
         Series of the drive about a recent time; see :func:`new_course`.
-    t, h : float
-        Time at the beginning of the step, and length of the step, s.
+    now : float or Instant
+        Time at the beginning of the step, s.
+    h : float
+        Length of the step, s.
     """
-    centre, reach = course[0, 0], course[0, 1]
-    if t >= centre and t + h <= centre + reach:
+    since, reach = _since(course, now), course[0, 1]
+    if since >= 0.0 and since + h <= reach:
         return
+    t, rest = clock.parts(now)
     # A series that serves a small part of a long step is not worth its coefficients. The reach may have grown since.
-    if h <= 2.0 * reach or t > 2.0 * centre:
-        expand(drive, t, COURSE_ORDER, course[0, 2:], course[1:])
-        course[0, 0], course[0, 1] = t, min(_reach(course), next_knot(drive, t) - t)
+    if h <= 2.0 * reach or t > 2.0 * course[0, 0]:
+        expand_at(drive, now, COURSE_ORDER, course[0, 2:], course[1:])
+        course[0, 0], course[0, COURSE_ORDER + 3] = t, rest
+        course[0, 1] = min(_reach(course), (next_knot(drive, t) - t) - rest)
+
+
+@inlined
+def _since(course, now):
+    """Time from the centre of a course to another time, s; minus infinity in an empty course."""
+    t, rest = clock.parts(now)
+    return (t - course[0, 0]) + (rest - course[0, COURSE_ORDER + 3])
 
 
 @inlined
@@ -380,37 +398,39 @@ def _reach(course):
 
 
 @hook(optional=True)
-def turn_near(drive, course, t):
-    """What :func:`turn` returns, but faster where the series of a course reaches.
+def turn_near(drive, course, now, s):
+    """What :func:`turn` returns the time `s` after another time, but faster where the series of a course reaches.
 
     Parameters
     ----------
     drive : NamedTuple
     course : ndarray of shape ``COURSE_SHAPE``
         See :func:`follow`.
-    t : float
-        Time, s.
+    now : float or Instant
+        The other time, s.
+    s : float
+        Time since then, s.
 
     Returns
     -------
     tuple of float
         As for :func:`turn`; equal to it but for rounding.
     """
-    s = t - course[0, 0]
-    if not 0.0 <= s <= course[0, 1]:
-        return turn(drive, t)
+    since = _since(course, now) + s
+    if not 0.0 <= since <= course[0, 1]:
+        return turn(drive, clock.later(now, s))
     theta, omega, half_epsilon = course[0, COURSE_ORDER + 2], 0.0, 0.0
     for k in range(COURSE_ORDER + 1, 1, -1):
-        half_epsilon = half_epsilon * s + omega
-        omega = omega * s + theta
-        theta = theta * s + course[0, k]
+        half_epsilon = half_epsilon * since + omega
+        omega = omega * since + theta
+        theta = theta * since + course[0, k]
     return theta, omega, 2.0 * half_epsilon
 
 
 @turn_near.implements(Table)
-def _turn_itself(drive, course, t):
+def _turn_itself(drive, course, now, s):
     # A polynomial is as fast as a series.
-    return turn(drive, t)
+    return turn(drive, clock.later(now, s))
 
 
 @hook(optional=True)
@@ -562,6 +582,7 @@ _SCOPE = {
     "nan": nan,
     "parts": clock.parts,
     "phase": clock.phase,
+    "shifted_phase": clock.shifted_phase,
     "power_of": raised,
     "sin_of": sin,
     "sqrt_of": sqrt,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from ringsweep.compile import hook
+from ringsweep.numerics.clock import later
 from ringsweep.physics import drives
 from ringsweep.physics.functions_of_time import common_period
 from ringsweep.quantities.parameters import Leaf, Parameter
@@ -132,10 +133,10 @@ def _turn(drive, t):
 
 
 @drives.turn_near.implements(Forced)
-def _turn_near(drive, course, t):
+def _turn_near(drive, course, now, s):
     # The course is that of the motion.
-    theta, omega, epsilon = drives.turn_near(drive.motion, course, t)
-    force, rate, _ = drives.turn(drive.force, t)
+    theta, omega, epsilon = drives.turn_near(drive.motion, course, now, s)
+    force, rate, _ = drives.turn(drive.force, later(now, s))
     return theta, omega, epsilon, rate, force + drive.constant
 
 
@@ -175,7 +176,7 @@ def _known_to(drive, t):
 
 @drives.jerk.implements(Forced)
 def _jerk(drive, t):
-    return drives.jerk(drive.motion, t)
+    return drives.jerk_at(drive.motion, t)
 
 
 @drives.next_knot.implements(Forced)

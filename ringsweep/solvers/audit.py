@@ -94,7 +94,7 @@ def _violation_in_series_step(scene, step, c, tolerance, s):
 @inlined
 def _ends(scene, step, course):
     """Forcing and state for implicit steps at both ends of a step."""
-    before, after = implicit.forcing(scene, course, step.now.t), implicit.forcing(scene, course, step.now.t + step.s)
+    before, after = implicit.forcing(scene, course, step.now, 0.0), implicit.forcing(scene, course, step.now, step.s)
     x, x_next = implicit.to_implicit(scene, before, step.y), implicit.to_implicit(scene, after, step.y_next)
     return (before, x), (after, x_next)
 
@@ -115,7 +115,7 @@ def _audit_implicit_step(scene, step, scratch, tolerance, audit):
 @inlined
 def _violation_in_implicit_step(scene, step, scratch, ends, tolerance, fraction):
     (x, x_next), bends = ends, scratch.bends[0]
-    forcing = implicit.forcing(scene, scratch.course, step.now.t + fraction * step.s)
+    forcing = implicit.forcing(scene, scratch.course, step.now, fraction * step.s)
     state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends, fraction))
     rates = rosenbrock.dense_rates(x, x_next, bends, fraction, step.s)
     return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
@@ -124,7 +124,7 @@ def _violation_in_implicit_step(scene, step, scratch, ends, tolerance, fraction)
 @inlined
 def _fall_rate_in_implicit_step(scene, step, scratch, guard):
     (before, x), (_, x_next) = _ends(scene, step, scratch.course)
-    late = implicit.forcing(scene, scratch.course, step.now.t + 0.9 * step.s)
+    late = implicit.forcing(scene, scratch.course, step.now, 0.9 * step.s)
     state = rosenbrock.dense(x, x_next, scratch.bends[0], 0.9)
     view = implicit.guards_and_motion(scene, step.mode, implicit.common(scene, step.mode, before, x), late, state)
     return view[0][guard - scratch.first_guard] / (0.1 * step.s)

@@ -114,7 +114,7 @@ def _step(family, scene, run, h_max, tolerances, scratch):
 @inlined
 def _creep(scene, run, h_max, tolerance, scratch):
     """Whether a mode is stiff, and the result of :func:`implicit_step` if it is; arguments as for :func:`_step`."""
-    start, control = start_at(scene, scratch.course, run.mode, run.now.t, run.y), run.control
+    start, control = start_at(scene, scratch.course, run.mode, run.now, run.y), run.control
     if not implicit.is_stiff(scene, run.mode, run.y, start.linear):
         return False, -1, 0.0, run.y, run.record, control, 0.0
     if control.last_h == 0.0:
@@ -159,7 +159,7 @@ def _step_either(family, scene, run, h_max, tolerances, scratch):
 
 @_step.implements(Dynamic)
 def _step_implicit(family, scene, run, h_max, tolerances, scratch):
-    start = start_at(scene, scratch.course, run.mode, run.now.t, run.y)
+    start = start_at(scene, scratch.course, run.mode, run.now, run.y)
     guard, s, y, record, control, error = implicit_step(
         scene, run.record, start, run.control, h_max, tolerances[1], scratch
     )

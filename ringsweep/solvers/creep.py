@@ -9,6 +9,7 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit, modes, recorder, variation
+from ringsweep.numerics.clock import Instant, later
 from ringsweep.numerics.series import ORDER, ascending, crossings, first_root, value
 from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
@@ -32,7 +33,7 @@ class Start(NamedTuple):
     Attributes
     ----------
     mode : NamedTuple
-    t : float
+    now : Instant
         Time, s.
     y, x : tuple of float
         State of the mode, and the same state for implicit steps.
@@ -42,7 +43,7 @@ class Start(NamedTuple):
     """
 
     mode: Any
-    t: float
+    now: Instant
     y: Any
     x: Any
     forcing: Any
@@ -58,18 +59,18 @@ class Taken(NamedTuple):
 
 
 @inlined
-def start_at(scene, course, mode, t, y):
-    """Beginning of an implicit step in the state `y` of a mode at time `t`."""
-    forcing = implicit.forcing(scene, course, t)
+def start_at(scene, course, mode, now, y):
+    """Beginning of an implicit step in the state `y` of a mode at an instant."""
+    forcing = implicit.forcing(scene, course, now, 0.0)
     x = implicit.to_implicit(scene, forcing, y)
     common = implicit.common(scene, mode, forcing, x)
-    return Start(mode, t, y, x, forcing, common, implicit.linearise(scene, mode, common, t, forcing, x))
+    return Start(mode, now, y, x, forcing, common, implicit.linearise(scene, mode, common, now, forcing, x))
 
 
 @inlined
 def _view_at(scene, start, course, s, x):
     """View of a state the time `s` after the beginning of a step."""
-    return implicit.guards_and_motion(scene, start.mode, start.common, implicit.forcing(scene, course, start.t + s), x)
+    return implicit.guards_and_motion(scene, start.mode, start.common, implicit.forcing(scene, course, start.now, s), x)
 
 
 @inlined
@@ -78,13 +79,13 @@ def _step(scene, start, course, h, end, bends):
 
     `end` is the forcing at the end.
     """
-    t = start.t
+    now = start.now
     first, second, third, fourth, _ = rosenbrock.STAGE_TIMES
     forcings = (
-        implicit.forcing(scene, course, t + first * h),
-        implicit.forcing(scene, course, t + second * h),
-        implicit.forcing(scene, course, t + third * h),
-        implicit.forcing(scene, course, t + fourth * h),
+        implicit.forcing(scene, course, now, first * h),
+        implicit.forcing(scene, course, now, second * h),
+        implicit.forcing(scene, course, now, third * h),
+        implicit.forcing(scene, course, now, fourth * h),
         end,
     )
     return rosenbrock.step(start.x, scene, start, h, forcings, bends)
@@ -93,7 +94,7 @@ def _step(scene, start, course, h, end, bends):
 @inlined
 def _guard_after(scene, start, scratch, h, g):
     """Value of guard `g` after a step of length `h`."""
-    end = implicit.forcing(scene, scratch.course, start.t + h)
+    end = implicit.forcing(scene, scratch.course, start.now, h)
     x_next, _ = _step(scene, start, scratch.course, h, end, scratch.bends[1])
     return implicit.guards_and_motion(scene, start.mode, start.common, end, x_next)[0][g]
 
@@ -107,12 +108,13 @@ def _locate(scene, start, scratch, h, ends, g):
     """
     (f_low, f_high), low, high = ends, 0.0, h
     if f_low <= 0.0:
-        # The guard is zero at the beginning: find a step after which it is positive, if there is one.
+        # The guard is zero at the beginning: find a step after which it is positive, or still zero, if there is one. A
+        # body at rest may stay there before it begins to move.
         s = h
         for _ in range(80):
             s *= 0.5
             f_low = _guard_after(scene, start, scratch, s, g)
-            if f_low > 0.0:
+            if f_low >= 0.0:
                 low = s
                 break
             high, f_high = s, f_low
@@ -130,7 +132,7 @@ def _locate(scene, start, scratch, h, ends, g):
             before, f_before, far, f_far = far, f_far, near, f_near
         near, f_near = s, f
         width = abs(far - near)
-        least = 0.5 * max(1e-14 * h, 2e-16 * start.t)
+        least = 0.5e-14 * h
         if width <= 2.0 * least:
             break
         place, height = (near - far) / (before - far), (f_near - f_far) / (f_before - f_far)
@@ -196,8 +198,9 @@ def _first_event(scene, start, scratch, taken, views):
         if h_below == 0.0:
             continue
         value_below = _guard_after(scene, start, scratch, h_below, g)
-        # Another guard may vanish first, or the dense output may be below zero by its error alone.
-        if value_below > 0.0:
+        # Another guard may vanish first, or the dense output may be below zero by its error alone. A body at rest stays
+        # at zero.
+        if value_below > 0.0 or value_below == before[0][g] == 0.0:
             continue
         found = _locate(scene, start, scratch, h_below, (before[0][g], value_below), g)
         if event < 0 or found < h_event * (1.0 - 1e-12):
@@ -301,17 +304,17 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         control after it; norm of its error, in units of the tolerance, if a guard, a knot of the drive or the span and
         not the tolerance limited its length, 0 otherwise.
     """
-    mode, t, y, x, forcing, common, linear = start
+    mode, now, y, x, forcing, common, linear = start
     course, bends = scratch.course, scratch.bends[0]
     record = enter_implicit(variation.asked(scene), scene, record, start)
     scales = implicit.error_scales(scene, tolerance, x)
     s = min(control.h, h_max)
-    drives.follow(scene.drive, course, t, s)
+    drives.follow(scene.drive, course, now, s)
     # `h` is the length of the next attempt: `s`, or less up to the `event` that a step of length `s` has shown.
     event, h, near = -1, s, False
     before = implicit.guards_and_motion(scene, mode, common, forcing, x)
     for _ in range(400):
-        end = implicit.forcing(scene, course, t + h)
+        end = implicit.forcing(scene, course, now, h)
         x_next, error = _step(scene, start, course, h, end, bends)
         h_norm = _error_norm(error, scales, linear)
         if not h_norm <= 1.0:
@@ -340,7 +343,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         if h == 0.0:
             return event, 0.0, y, record, control, 0.0
     taken, fractions, count = Taken(h, x_next), scratch.work[0], 0
-    record = recorder.enter(scene, record, t, implicit.seen(scene, before))
+    record = recorder.enter(scene, record, now.t, implicit.seen(scene, before))
     velocity, acceleration = implicit.motion(scene, forcing, x, linear)
     for begin, view in ((0.0, middle), (0.5, after)):
         # Where velocity or acceleration change sign, place or velocity have an extreme: the recorder must look there.
@@ -354,7 +357,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
         fractions[count] = i / INSTANTS
         count += 1
-    due = variation.due(scene, record) - t
+    due = (variation.due(scene, record) - now.t) - now.rest
     if 0.0 < due < h:
         fractions[count] = due / h
         count += 1
@@ -369,7 +372,9 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         duration = (fraction - fraction_before) * h
         ends = fraction_before, fraction
         record = along_implicit(variation.asked(scene), scene, record, start, taken, ends, scratch)
-        record = recorder.observe(scene, record, t + fraction * h, duration, stuck, implicit.seen(scene, view))
+        record = recorder.observe(
+            scene, record, later(now, fraction * h).t, duration, stuck, implicit.seen(scene, view)
+        )
         fraction_before = fraction
     return event, h, implicit.from_implicit(scene, end, x_next), record, control, h_norm if h < s or s == h_max else 0.0
 

@@ -73,8 +73,8 @@ def _along_implicit(asked, scene, record, start, taken, ends, scratch):
     forcing, x = start.forcing, start.x
     for i in range(len(FEW)):
         fraction = low + (high - low) * FEW[i]
-        t = start.t + fraction * taken.h
-        forcing = implicit.forcing(scene, scratch.course, t)
+        t = later(start.now, fraction * taken.h)
+        forcing = implicit.forcing(scene, scratch.course, start.now, fraction * taken.h)
         x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
         store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
     # The last node is the end.

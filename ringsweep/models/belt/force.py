@@ -5,7 +5,6 @@ from __future__ import annotations
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import shock
 from ringsweep.models.slip import Slip
-from ringsweep.numerics.clock import parts
 from ringsweep.numerics.functions import opposing, select
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import OnBelt
@@ -130,7 +129,7 @@ def rounding_of_reserve(scene, motion, acceleration):
 def stuck_rates(scene, t, x, forcing):
     """Time derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt, N/s."""
     _, velocity, acceleration = forcing[:3]
-    push_rate, jerk = force_rate(scene.drive, forcing), drives.jerk(scene.drive, parts(t)[0])
+    push_rate, jerk = force_rate(scene.drive, forcing), drives.jerk_at(scene.drive, t)
     rates, cube_rate = (velocity, push_rate, acceleration), 3.0 * x * x * velocity
     load, _, friction = ring.held(scene.body, 0.0, rates, cube_rate, jerk, 0.0)
     return -friction, scene.mu_s * load

@@ -68,8 +68,8 @@ def is_stiff(scene, mode, y, linear):
 
 
 @inlined
-def forcing(scene, course, t):
-    """Forcing at a time.
+def forcing(scene, course, now, s):
+    """Forcing the time `s` after another time.
 
     Parameters
     ----------
@@ -77,15 +77,17 @@ def forcing(scene, course, t):
         One cell.
     course : ndarray
         Series of the drive about a recent time, see :func:`ringsweep.physics.drives.follow`.
-    t : float
-        Time, s.
+    now : Instant
+        The other time, s.
+    s : float
+        Time since then, s.
 
     Returns
     -------
     tuple of float
         What :func:`ringsweep.physics.drives.turn` returns.
     """
-    return drives.turn_near(scene.drive, course, t)
+    return drives.turn_near(scene.drive, course, now, s)
 
 
 @hook(optional=True)
@@ -183,7 +185,7 @@ def linearise(scene, mode, common, t, forcing, x):
         One cell, and its mode.
     common : tuple
         What :func:`common` returned for the state at the beginning of the step.
-    t : float
+    t : Instant
         Time, s.
     forcing : tuple of float
         Forcing at the time of the state.

@@ -11,7 +11,6 @@ from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.long_run import with_tangent
 from ringsweep.models.ring.record import with_long_run
 from ringsweep.models.ring.series import EDGE
-from ringsweep.numerics.clock import parts
 from ringsweep.physics import contact, drives
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.physics.ring import Ring
@@ -64,7 +63,7 @@ def _gradient(scene, mode, guard, t, y, rates):
 def _gradient_of_reserve(scene, mode, t, phi):
     """Gradient of the reserve of friction, whose zero ends stick, over its rate."""
     _, omega, epsilon = drives.turn(scene.drive, t)
-    at, rates = (phi, omega, epsilon), (omega, epsilon, drives.jerk(scene.drive, parts(t)[0]))
+    at, rates = (phi, omega, epsilon), (omega, epsilon, drives.jerk_at(scene.drive, t))
     fast = (scene.body.gravity / scene.body.radius) ** 0.5 + abs(omega) + abs(epsilon) ** 0.5
     by_phi = _reserve_rate(scene, mode, at, (1.0, 0.0, 0.0), _SMALL)
     rate = _reserve_rate(scene, mode, at, rates, _SMALL / fast if fast > 0.0 else _SMALL)

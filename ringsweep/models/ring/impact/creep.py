@@ -144,7 +144,9 @@ def _linearise(scene, mode, common, t, forcing, x):
     by_v = _derivative(scene, f, friction, found, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     by_eta = _derivative(scene, f, friction, found, (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
     by_rate = _derivative(scene, f, friction, found, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-    by_time = _derivative(scene, f, friction, found, nothing, (ring_omega, ring_epsilon, drives.jerk(scene.drive, t)))
+    by_time = _derivative(
+        scene, f, friction, found, nothing, (ring_omega, ring_epsilon, drives.jerk_at(scene.drive, t))
+    )
     per_radius = 1.0 / scene.closed.body.radius
     rows = (
         (0.0, per_radius, 0.0, scene.balls.reach * per_radius),
