@@ -79,10 +79,10 @@ class _Writer:
         if node.kind in ("sin", "cos") and (turning := frequency(node.parts[0])) is not None:
             _straight(self, list(turning))
             turns, shift, start = (self.known[part] for part in turning)
-            call = (
-                f"phase({turns}, now, rest, " if turning[1] is ZERO else f"shifted_phase({turns}, now, rest, {shift}, "
-            )
-            return self.new(f"{node.kind}_of({call}{start}))")
+            phase = f"phase({turns}, now, rest, {start})"
+            if turning[1] is not ZERO:
+                phase = f"shifted_phase({turns}, now, rest, {shift}, {start})"
+            return self.new(f"{node.kind}_of({phase})")
         parts = [self.known[part] for part in node.parts]
         if node.kind in _OPERATORS:
             text = f" {_OPERATORS[node.kind]} ".join(parts)
