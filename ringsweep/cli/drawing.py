@@ -68,7 +68,7 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
             netcdf.check_kind(written, "vertex", "boundary")
         # What the picture cannot have is told before the boundary is computed.
         word = {"word": arguments.boundaries} if is_sampled(result) else {}
-        Map.of(along, (arguments.x, arguments.y), arguments.var, word).check_takes_curves()
+        Map(along, (arguments.x, arguments.y), arguments.var, word).check_takes_curves()
 
         from ringsweep.runs.boundaries import boundary, run_at
         from ringsweep.runs.executors import Execution

@@ -12,7 +12,7 @@ from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
@@ -96,11 +96,51 @@ def history(ds: xr.Dataset) -> Figure:
     4
     """
     ds = datasets.require_history(ds)
+    panels, strip, several = datasets.panels_of(ds), datasets.zones(ds), datasets.compares_laws(ds)
+    start, breakaway, cycles = _differences(ds), _first_breakaway(ds), _cycles(ds)
+    rows, many = len(panels) + bool(strip), len(cycles) > _MANY_CYCLES
+    heights = [1.0] * len(panels) + [0.13 * len(strip)] * bool(strip)
+    heights += [1.0] * ((start is not None) + (breakaway is not None))
     width = look.figure_width()
     # Panels must be as high as their labels.
     height = min(max(0.2 * width, 13.5 * rcParams["font.size"] / 100.0), 1.9)
-    figure = Figure(figsize=(width, height * sum(_heights(ds)) + 0.8), layout="constrained")
-    draw_history(figure, ds)
+    figure = Figure(figsize=(width, height * sum(heights) + 0.8), layout="constrained")
+    grid = figure.add_gridspec(len(heights), 1 + many, height_ratios=heights)
+    columns = [[figure.add_subplot(grid[k, column]) for k in range(rows)] for column in range(1 + many)]
+    details = [figure.add_subplot(grid[k, :]) for k in range(rows, len(heights))]
+    for column in columns:
+        for ax in column[1:]:
+            ax.sharex(column[0])
+        for ax in column[:-1]:
+            ax.tick_params(labelbottom=False)
+    whole = columns[0]
+    for ax, names in zip(whole, panels, strict=False):
+        if several:
+            _draw_laws(ax, ds, names)
+        else:
+            draw_panel(ax, ds, names, band=cycles if many else None)
+    if strip:
+        _draw_zones(whole[-1], ds, strip)
+    whole[-1].set_xlabel(axis_label(ds["time"], ds))
+    first, last = time_limits(ds)
+    if last > first:
+        whole[0].set_xlim(first, last)
+    if many:
+        late = ds.isel(time=slice(cycles[-_LAST_CYCLES - 1], None))
+        _draw_late(columns[1], late, panels, strip, whole)
+    if start is not None:
+        _draw_start(details[0], ds, *start, whole[-1])
+    if breakaway is not None:
+        _draw_breakaway(details[-1], ds, *breakaway)
+    figure.align_ylabels([*whole, *details])
+    if several:
+        lines = whole[0].get_legend_handles_labels()
+        most = 4 if len(lines[0]) == 4 else 3
+        # A line of each entry, its label, and the space around them.
+        count = max(1, min(most, look.letters(width) // (max(map(len, lines[1])) + 11)))
+        figure.legend(*lines, loc="outside upper center", ncols=count, handlelength=4, **look.LEGEND)
+    elif texts := list(filter(None, [*datasets.outcome(ds).splitlines(), "; ".join(datasets.scene_text(ds))])):
+        figure.suptitle("\n".join(look.folded([text], width) for text in texts), fontsize="medium")
     return figure
 
 
@@ -153,87 +193,38 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
     return ax
 
 
-def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
-    """Fill a figure, or a subfigure, with the panels of :func:`history`."""
-    ds = datasets.require_history(ds)
-    panels = datasets.panels_of(ds)
+def _draw_late(
+    panels: list[Axes], late: xr.Dataset, names: list[tuple[str, ...]], strip: list[str], whole: list[Axes]
+) -> None:
+    """Draw the last cycles beside the panels of the whole run."""
+    for ax, beside, own in zip(panels, whole, names, strict=False):
+        draw_panel(ax, late, own)
+        ax.set(ylim=beside.get_ylim(), ylabel="")
+        # The axis beside it says so.
+        ax.set_title("", loc="left")
+        ax.set_title("", loc="right")
+    if strip:
+        _draw_zones(panels[-1], late, strip)
+        panels[-1].set_yticks([])
+    panels[0].set_xlim(*time_limits(late))
+    for ax, what in ((whole[-1], "band: least to greatest"), (panels[-1], f"the last {_LAST_CYCLES} cycles")):
+        ax.set_xlabel(look.folded([axis_label(late["time"], late), what], look.width_of(whole[-1]) - look.MARGIN))
+
+
+def _draw_start(axes: Axes, ds: xr.Dataset, first: float, last: float, whole: Axes) -> None:
+    """Draw the friction force for twice as long as it differs, from the first to the last difference, at the start."""
     time = ds["time"].values
-    heights = _heights(ds)
-    start, breakaway = _differences(ds), _first_breakaway(ds)
-    cycles = _cycles(ds)
-    many = len(cycles) > _MANY_CYCLES
-    late = ds.isel(time=slice(cycles[-_LAST_CYCLES - 1], None)) if many else ds
-    grid = figure.add_gridspec(len(heights), 1 + many, height_ratios=heights)
-    rows = len(heights) - (start is not None) - (breakaway is not None)
-    axes = [figure.add_subplot(grid[k, 0] if k < rows else grid[k, :]) for k in range(len(heights))]
-    whole = axes[:rows]
-    beside = [figure.add_subplot(grid[k, 1]) for k in range(rows * many)]
-    for column in filter(None, (whole, beside)):
-        for ax in column[1:]:
-            ax.sharex(column[0])
-        for ax in column[:-1]:
-            ax.tick_params(labelbottom=False)
-    draw = _draw_laws if datasets.compares_laws(ds) else draw_panel
-    for k, (ax, names) in enumerate(zip(axes, panels, strict=False)):
-        if many:
-            draw_panel(ax, ds, names, band=cycles)
-            draw_panel(beside[k], late, names)
-            beside[k].set(ylim=ax.get_ylim(), ylabel="")
-            # The axis beside it says so.
-            beside[k].set_title("", loc="left")
-            beside[k].set_title("", loc="right")
-        else:
-            draw(ax, ds, names)
-    if strip := datasets.zones(ds):
-        _draw_zones(whole[-1], ds, strip)
-        if many:
-            _draw_zones(beside[-1], late, strip)
-            beside[-1].set_yticks([])
-    if start is not None:
-        first, last = start
-        until = max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))
-        after = axes[len(whole)]
-        draw(after, ds.isel(time=slice(0, until)), ("friction_force",))
-        if 0.0 < first < 0.05 * last:
-            after.set_xscale("log")
-            after.set_xlim(left=first / 20.0)
-        # The force of one law alone would flatten the others: bristles may be far above them for a moment.
-        after.set_ylim(whole[-1].get_ylim())
-        look.small_ticks(after)
-        texts = ["friction force just after the start", whole[-1].get_title(loc="right")]
-        after.set_title("", loc="right")
-        after.set_title(look.folded(texts, 0.9 * look.width_of(after)), fontsize=look.SMALL, loc="left")
-        after.set_xlabel(axis_label(ds["time"], ds))
-    if breakaway is not None:
-        _draw_breakaway(axes[-1], ds, *breakaway)
-    if time[-1] > time[0]:
-        whole[0].set_xlim(*time_limits(ds))
-    whole[-1].set_xlabel(axis_label(ds["time"], ds))
-    if many:
-        inches = look.width_of(whole[-1]) - look.MARGIN
-        label = axis_label(ds["time"], ds)
-        whole[-1].set_xlabel(look.folded([label, "band: least to greatest"], inches))
-        beside[-1].set_xlabel(look.folded([label, f"the last {_LAST_CYCLES} cycles"], inches))
-        beside[0].set_xlim(float(late["time"][0]), time_limits(ds)[1])
-    figure.align_ylabels(axes)
-    if datasets.compares_laws(ds):
-        lines = axes[0].get_legend_handles_labels()
-        most = 4 if len(lines[0]) == 4 else 3
-        # A line of each entry, its label, and the space around them.
-        longest = max(map(len, lines[1])) + 11
-        columns = max(1, min(most, look.letters(figure.bbox.width / float(figure.dpi)) // longest))
-        figure.legend(*lines, loc="outside upper center", ncols=columns, handlelength=4, **look.LEGEND)
-    elif text := "\n".join(filter(None, (datasets.outcome(ds), "; ".join(datasets.scene_text(ds))))):
-        inches = figure.bbox.width / float(figure.dpi)
-        figure.suptitle("\n".join(look.folded([line], inches) for line in text.splitlines()), fontsize="medium")
-
-
-def _heights(ds: xr.Dataset) -> list[float]:
-    """Relative heights of all panels, with those of the start and of the break-away, and the strip of the zones."""
-    strip, details = len(datasets.zones(ds)), (_differences(ds), _first_breakaway(ds))
-    return [1.0] * (len(datasets.panels_of(ds)) + sum(detail is not None for detail in details)) + [
-        0.13 * strip
-    ] * bool(strip)
+    until = max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))
+    _draw_laws(axes, ds.isel(time=slice(0, until)), ("friction_force",))
+    if 0.0 < first < 0.05 * last:
+        axes.set_xscale("log")
+        axes.set_xlim(left=first / 20.0)
+    # The force of one law alone would flatten the others: bristles may be far above them for a moment.
+    axes.set_ylim(whole.get_ylim())
+    texts = ["friction force just after the start", whole.get_title(loc="right")]
+    axes.set_title("", loc="right")
+    axes.set_title(look.folded(texts, 0.9 * look.width_of(axes)), fontsize=look.SMALL, loc="left")
+    axes.set_xlabel(axis_label(ds["time"], ds))
 
 
 def draw_panel(

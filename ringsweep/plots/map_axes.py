@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,8 @@ class Axis:
         Sorted values as displayed, angles in degrees. A name has its position among `names` as value.
     order : ndarray of shape ``(size,)``
         Index in the dataset of each value.
+    factor : float
+        From numbers of the dataset to those displayed.
     scale : str
         ``"log"`` or ``"linear"``.
     names : tuple of str
@@ -58,6 +60,7 @@ class Axis:
     label: str
     values: NDArray[Any]
     order: NDArray[np.intp]
+    factor: float
     scale: str
     names: tuple[str, ...] = ()
     meet: NDArray[Any] = field(default_factory=lambda: np.empty(0))
@@ -66,9 +69,10 @@ class Axis:
     def of(cls, coordinate: xr.DataArray, ds: xr.Dataset) -> Axis:
         """The axis of a coordinate of a dataset; InputError if its values are too large."""
         names: tuple[str, ...] = ()
+        factor = display_factor(coordinate)
         if is_numeric(coordinate):
             with np.errstate(over="ignore"):
-                values = coordinate.values * display_factor(coordinate)
+                values = coordinate.values * factor
             # The edges of its cells lie beyond the values.
             if not (np.abs(values) < _LARGEST).all():
                 raise InputError("ds", f"values of {coordinate.name} are too large to be drawn")
@@ -79,7 +83,11 @@ class Axis:
         order = np.argsort(values, kind="stable")
         scale = "log" if _is_geometric(np.unique(values)) else "linear"
         dims = tuple(map(str, coordinate.dims))
-        return cls(str(coordinate.name), dims, axis_label(coordinate, ds), values[order], order, scale, names)
+        return cls(str(coordinate.name), dims, axis_label(coordinate, ds), values[order], order, factor, scale, names)
+
+    def within(self, ds: xr.Dataset) -> Axis:
+        """The axis of a part of the dataset, in the same scale."""
+        return replace(Axis.of(ds[self.name], ds), scale=self.scale)
 
     @property
     def is_gridded(self) -> bool:

@@ -194,18 +194,21 @@ def legend_entries(
 ) -> list[Artist]:
     """Entries of the legend for classes, missing values and warnings, each with its share of the cells."""
     entries: list[Artist] = []
+
+    def add(where: NDArray[Any], label: str, colour: Any) -> None:
+        if where.any():
+            entries.append(Patch(color=colour, label=f"{label}, {_share(where)}"))
+
     shown = np.isfinite(data.values)
     if scale.flags is not None and scale.meanings is not None:
         shown = np.isin(data.values, scale.flags)
         for k, (flag, meaning) in enumerate(zip(scale.flags, scale.meanings, strict=True)):
-            where = data.values == flag
-            if where.any():
-                entries.append(Patch(color=scale.colours(k), label=f"{meaning}, {_share(where)}"))
+            add(data.values == flag, meaning, scale.colours(k))
     if not shown.all():
         other = ~shown & ~_inferred_apart(ds, data).values
-        entries.append(Patch(color=look.on_page(look.NO_VALUE), label=f"{missing_text(ds, data)}, {_share(other)}"))
-    if isinstance(scale.norm, LogNorm) and (zero := data.values == 0.0).any():
-        entries.append(Patch(color=ZERO, label=f"exactly 0, {_share(zero)}"))
+        add(other, missing_text(ds, data), look.on_page(look.NO_VALUE))
+    if isinstance(scale.norm, LogNorm):
+        add(data.values == 0.0, "exactly 0", ZERO)
     ink = look.on_page("black")
     for warning in warnings:
         label = f"{warning.label}, {_share(warning.cells.values)}"
@@ -221,9 +224,8 @@ def legend_entries(
 
 def _with_grey(colours: str | Colormap) -> Colormap:
     """A colour map with grey for missing values."""
-    return (colormaps[colours] if isinstance(colours, str) else colours).with_extremes(
-        bad=to_rgb(look.on_page(look.NO_VALUE))
-    )
+    palette = colormaps[colours] if isinstance(colours, str) else colours
+    return palette.with_extremes(bad=to_rgb(look.on_page(look.NO_VALUE)))
 
 
 def _share(mask: NDArray[Any]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -117,54 +117,23 @@ def regime_map(
     >>> regime_map(ds, var="phi_max").axes[0].get_ylabel()
     'angle (°)'
     """
-    found = Map.of(ds, (x, y), var, sel, (norm, cmap), units)
+    found = Map(ds, (x, y), var, sel, (norm, cmap), units)
     if boundaries is not None:
         found.entries.append(found.curve_entry(boundaries))
         if found.vertical is None:
             # Cells of a strip meet where the boundary is: halfway would leave slivers of the wrong colour beside it.
-            places = boundaries[found.horizontal.name]
-            factor = labels.display_factor(found.ds[found.horizontal.name])
-            found = replace(found, horizontal=replace(found.horizontal, meet=places.values * factor))
+            places = boundaries[found.horizontal.name].values * found.horizontal.factor
+            found.horizontal = replace(found.horizontal, meet=places)
     width = look.figure_width()
-    if len(found.panels) == 1:
-        height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
-        figure = Figure(figsize=(width, height * width + (0.7 if look.is_narrow(width) else 0.3)), layout="constrained")
-        ax = figure.add_subplot()
-        found.draw_alone(ax, title, legend)
-        if boundaries is not None:
-            found.draw_curves(ax, boundaries)
-        return figure
-    panels = found.panels
-    # Narrower panels have no room for ticks and titles.
-    columns = max(1, min(found.columns, int((width - look.MARGIN) / 1.2)))
-    rows = math.ceil(len(panels) / columns)
-    bar = found.scale.meanings is None and found.vertical is not None
-    each = (width - look.MARGIN * (2 if bar else 1)) / columns
-    titles = ["\n".join(look.folded([text], each) for text in texts) for texts, _ in panels]
-    lines = max(title.count("\n") + 1 for title in titles)
-    height = rows * (0.75 * each + 0.0175 * rcParams["font.size"] * lines) + 1.3
-    figure = Figure(figsize=(width, height), layout="constrained")
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes in grid.flat[len(panels) :]:
-        axes.remove()
-    # If the last row is short, panels of the row above it need tick labels.
-    for axes in grid.flat[len(panels) - columns : len(panels)]:
-        axes.xaxis.set_tick_params(labelbottom=True)
-    for axes, words, (_, index) in zip(grid.flat, titles, panels, strict=False):
-        axes.set_title(words, fontsize=look.SMALL)
-        found.draw(axes, index)
-    figure.supxlabel(found.horizontal.label, fontsize="medium")
-    figure.supylabel(found.vertical_label, fontsize="medium")
-    if bar:
-        found.add_colour_bar(list(grid.flat[: len(panels)]))
-    text = found.title_text(title, width)
-    if found.entries and legend is not False:
-        # A legend above the panels would cover a title of the figure, and one below them the label of the axis.
-        style = look.LEGEND | {"handleheight": 1.4, "columnspacing": 1.2, "title": text, "title_fontsize": "medium"}
-        columns = look.columns_of(found.entries, width)
-        figure.legend(handles=found.entries, loc="outside upper center", ncols=columns, **style)
-    elif text:
-        figure.suptitle(text, fontsize="medium")
+    if len(found.panels) > 1:
+        return found.draw_panels(width, title, legend)
+    height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
+    extra = 0.7 if look.is_narrow(width) else 0.3
+    figure = Figure(figsize=(width, height * width + extra), layout="constrained")
+    ax = figure.add_subplot()
+    found.draw_alone(ax, title, legend)
+    if boundaries is not None:
+        found.draw_curves(ax, boundaries)
     return figure
 
 
@@ -218,15 +187,25 @@ def map_panel(
     >>> map_panel(ds, var="phi_max", ax=Figure().add_subplot()).get_ylabel()
     'phi_max (°)'
     """
-    found = Map.of(ds, (x, y), var, sel)
+    found = Map(ds, (x, y), var, sel)
     ax = look.axes_or_current(ax, 0.65)
     found.draw_alone(ax, title, legend)
     return ax
 
 
-@dataclass(frozen=True)
+#: Warnings of a panel with the cells that have them.
+Warnings = list[tuple[CellWarning, xr.DataArray]]
+
+
 class Map:
-    """A map before it is drawn.
+    """A map before it is drawn; arguments and errors as for :func:`regime_map`.
+
+    Parameters
+    ----------
+    axes : tuple of str or None
+        `x` and `y`.
+    colours : tuple of str or None
+        `norm` and `cmap`.
 
     Attributes
     ----------
@@ -250,73 +229,50 @@ class Map:
         What the title says: the variable, values held, cells left out.
     """
 
-    ds: xr.Dataset
-    data: xr.DataArray
-    horizontal: Axis
-    vertical: Axis | None
-    scattered: bool
-    scale: ColourScale
-    warnings: list[CellWarning]
-    panels: list[tuple[list[str], dict[str, int]]]
-    columns: int
-    entries: list[Artist]
-    texts: list[str]
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         ds: xr.Dataset,
         axes: tuple[str | None, str | None],
         var: str,
         sel: Mapping[str, float | str] | None,
         colours: tuple[str | None, str | None] = (None, None),
         units: Mapping[str, str] | None = None,
-    ) -> Map:
-        """Choose axes, panels and colours; arguments and errors as for :func:`regime_map`.
-
-        `axes` are `x` and `y`, `colours` are `norm` and `cmap`.
-        """
+    ):
         require_sweep(ds)
         ds, sel = labels.in_units(ds, units), sel or {}
         if is_sampled(ds):
             var = "probability" if var == "regime" else var
             # Regimes that occur nowhere have no map.
             if "word" not in sel and "word" in ds.dims:
-                ds = ds.isel(
-                    word=(ds["probability"] > 0.0).any([d for d in ds["probability"].dims if d != "word"]).values
-                )
+                occurs = ds["probability"] > 0.0
+                ds = ds.isel(word=occurs.any([dim for dim in occurs.dims if dim != "word"]).values)
         var = resolve("var", var, numeric_names(ds))
-        ds, held, horizontal, vertical = choose_axes(ds, var, sel, *axes)
-        data = labels.displayed(ds[var])
-        scattered = is_scattered(horizontal, vertical)
-        scale = ColourScale.of(data, *colours)
-        warnings = cell_warnings(ds, data)
-        others = [str(d) for d in data.dims if d not in {*horizontal.dims, *(vertical.dims if vertical else ())}]
-        panels = _panels(ds, others)
-        columns = math.ceil(math.sqrt(len(panels)))
+        self.ds, held, horizontal, vertical = choose_axes(ds, var, sel, *axes)
+        data = labels.displayed(self.ds[var])
+        self.scattered = is_scattered(horizontal, vertical)
+        self.scale = ColourScale.of(data, *colours)
+        warnings = cell_warnings(self.ds, data)
+        along = {*horizontal.dims, *(vertical.dims if vertical else ())}
+        self.panels = _panels(self.ds, [str(dim) for dim in data.dims if dim not in along])
+        self.columns = math.ceil(math.sqrt(len(self.panels)))
         # A line is drawn with all its values: every peak stays visible.
-        drawn = {} if scattered or vertical is None else thinned([horizontal, vertical], _MOST_CELLS // columns, data)
-        thin = ds.isel(drawn)
-        share = math.prod(ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
+        drawn = {}
+        if not self.scattered and vertical:
+            drawn = thinned([horizontal, vertical], _MOST_CELLS // self.columns, data)
+        thin = self.ds.isel(drawn)
+        self.data = labels.displayed(thin[var])
+        self.horizontal, self.vertical = horizontal.within(thin), vertical.within(thin) if vertical else None
+        self.warnings = [replace(warning, cells=warning.cells.isel(drawn)) for warning in warnings]
+        self.entries = legend_entries(self.scale, self.ds, data, warnings, self.scattered)
+        share = math.prod(self.ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
         # The legend of a map of origins has the shares, and its title is long.
-        name, told, audit = "" if scale.meanings is None else labels.long_name(data), scene_text(ds), audit_texts(ds)
+        name = "" if self.scale.meanings is None else labels.long_name(data)
+        told, audit = scene_text(self.ds), audit_texts(self.ds)
         if var == "origin":
             name, told = "cells run or inferred", []
             audit = [text.replace("others: at most", "inferred: ≤") for text in audit[1:]]
-        return cls(
-            ds,
-            labels.displayed(thin[var]),
-            replace(Axis.of(thin[horizontal.name], thin), scale=horizontal.scale),
-            replace(Axis.of(thin[vertical.name], thin), scale=vertical.scale) if vertical else None,
-            scattered,
-            scale,
-            [replace(warning, cells=warning.cells.isel(drawn)) for warning in warnings],
-            panels,
-            columns,
-            legend_entries(scale, ds, data, warnings, scattered),
-            [name, *held, *told, *thinning, *audit],
-        )
+        self.texts = [name, *held, *told, *thinning, *audit]
 
     @property
     def vertical_label(self) -> str:
@@ -331,6 +287,41 @@ class Map:
             return title
         return look.folded(self.texts, inches) if title else ""
 
+    def draw_panels(self, width: float, title: bool | str, legend: bool | str) -> Figure:
+        """A new figure of this width with a panel for each value along the dimensions that are not axes."""
+        # Narrower panels have no room for ticks and titles.
+        columns = max(1, min(self.columns, int((width - look.MARGIN) / 1.2)))
+        count = len(self.panels)
+        rows = math.ceil(count / columns)
+        bar = self.scale.meanings is None and self.vertical is not None
+        each = (width - look.MARGIN * (2 if bar else 1)) / columns
+        titles = ["\n".join(look.folded([text], each) for text in texts) for texts, _ in self.panels]
+        lines = max(title.count("\n") + 1 for title in titles)
+        height = rows * (0.75 * each + 0.0175 * rcParams["font.size"] * lines) + 1.3
+        figure = Figure(figsize=(width, height), layout="constrained")
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        for axes in grid.flat[count:]:
+            axes.remove()
+        # If the last row is short, panels of the row above it need tick labels.
+        for axes in grid.flat[count - columns : count]:
+            axes.xaxis.set_tick_params(labelbottom=True)
+        for axes, words, (_, index) in zip(grid.flat, titles, self.panels, strict=False):
+            axes.set_title(words, fontsize=look.SMALL)
+            self.draw(axes, index)
+        figure.supxlabel(self.horizontal.label, fontsize="medium")
+        figure.supylabel(self.vertical_label, fontsize="medium")
+        if bar:
+            self.add_colour_bar(list(grid.flat[:count]))
+        text = self.title_text(title, width)
+        if self.entries and legend is not False:
+            # A legend above the panels would cover a title of the figure, and one below them the label of the axis.
+            style = look.LEGEND | {"handleheight": 1.4, "columnspacing": 1.2, "title": text, "title_fontsize": "medium"}
+            columns = look.columns_of(self.entries, width)
+            figure.legend(handles=self.entries, loc="outside upper center", ncols=columns, **style)
+        elif text:
+            figure.suptitle(text, fontsize="medium")
+        return figure
+
     def draw(self, axes: Axes, index: Mapping[str, int]) -> None:
         """Draw the panel at an index along the dimensions that are not axes."""
         look.small_ticks(axes)
@@ -338,13 +329,15 @@ class Map:
         if self.vertical:
             self.vertical.apply(axes.set_yscale, axes.yaxis)
         numbers = self.scale.numbers(self.data.isel(index))
-        warnings = [
-            replace(warning, cells=warning.cells.isel(index)) for warning in self.warnings if not warning.everywhere
-        ]
         if self.vertical is None and self.scale.meanings is None:
-            self._draw_line(axes, numbers)
-            self._draw_band(axes, index)
-        elif self.scattered and self.vertical:
+            self._draw_line(axes, numbers, index)
+            return
+        warnings = [
+            (warning, warning.cells.isel(index).transpose(*numbers.dims))
+            for warning in self.warnings
+            if not warning.everywhere
+        ]
+        if self.scattered and self.vertical:
             self._draw_points(axes, self.vertical, numbers, warnings)
         else:
             self._draw_cells(axes, numbers, warnings)
@@ -356,13 +349,10 @@ class Map:
         for number in np.unique(boundaries["line"]):
             line = boundaries.isel(vertex=boundaries["line"].values == number)
             if self.vertical is None:
-                axes.axvline(line[self.horizontal.name].values[0] * self._factor(self.horizontal), **_CURVE)
+                axes.axvline(line[self.horizontal.name].values[0] * self.horizontal.factor, **_CURVE)
             else:
                 points = self._whole_curve(self.vertical, line)
                 axes.plot(*points.T, marker="." if len(points) == 1 else "", **_CURVE)
-
-    def _factor(self, axis: Axis) -> float:
-        return labels.display_factor(self.ds[axis.name])
 
     def _whole_curve(self, vertical: Axis, line: xr.Dataset) -> NDArray[Any]:
         """Points of a curve, shape ``(points, 2)``: up to the frame if it ends at it, and closed if it is.
@@ -370,7 +360,7 @@ class Map:
         The points of a boundary lie between the middles of cells, so the last of them is half a cell from the frame.
         """
         pair = self.horizontal, vertical
-        points = np.column_stack([line[axis.name].values * self._factor(axis) for axis in pair])
+        points = np.column_stack([line[axis.name].values * axis.factor for axis in pair])
         along = line["axis"].attrs["flag_meanings"].split()
         inside = True
         for end in (0, -1):
@@ -410,21 +400,17 @@ class Map:
         )
         return Line2D([], [], label=f"boundary of {regime}\n± {' or '.join(errors)}", **_CURVE)
 
-    def _draw_line(self, axes: Axes, data: xr.DataArray) -> None:
-        numbers, edges = data.values[self.horizontal.order], self.horizontal.edges
+    def _draw_line(self, axes: Axes, data: xr.DataArray, index: Mapping[str, int]) -> None:
+        """Draw numbers along one axis, with the interval of a probability or a quantile if the dataset has it."""
+        x, numbers, edges = self.horizontal.values, self.horizontal.along(data), self.horizontal.edges
         gaps = [(edges[i], edges[j] - edges[i]) for i, j in look.true_ranges(np.isnan(numbers))]
-        axes.broken_barh(
-            gaps, (0, 1), transform=axes.get_xaxis_transform(), color=look.on_page(look.NO_VALUE), linewidth=0
-        )
-        marker = "o" if len(numbers) <= 100 else "."
-        axes.plot(self.horizontal.values, numbers, marker=marker, markersize=4, color=look.pair(0))
-
-    def _draw_band(self, axes: Axes, index: Mapping[str, int]) -> None:
-        """Draw the interval of a probability or a quantile, if the dataset has it."""
+        grey = look.on_page(look.NO_VALUE)
+        axes.broken_barh(gaps, (0, 1), transform=axes.get_xaxis_transform(), color=grey, linewidth=0)
+        axes.plot(x, numbers, marker="o" if len(x) <= 100 else ".", markersize=4, color=look.pair(0))
         ends = [f"{self.data.name}{end}" for end in ("_low", "_high")]
         if all(end in self.ds for end in ends):
-            low, high = (labels.displayed(self.ds[end].isel(index)).values[self.horizontal.order] for end in ends)
-            look.band(axes, self.horizontal.values, low, high, look.pair(0))
+            low, high = (self.horizontal.along(labels.displayed(self.ds[end].isel(index))) for end in ends)
+            look.band(axes, x, low, high, look.pair(0))
 
     def _draw_levels(self, axes: Axes, vertical: Axis, data: xr.DataArray) -> None:
         """Draw the curves along which a probability is 5, 50 and 95 %."""
@@ -439,49 +425,40 @@ class Map:
             for text in axes.clabel(curves, fmt=lambda level: f"{level:.0%}", fontsize=look.SMALL):
                 text.set_path_effects(stroke)
 
-    def _draw_points(self, axes: Axes, vertical: Axis, data: xr.DataArray, warnings: list[CellWarning]) -> None:
+    def _draw_points(self, axes: Axes, vertical: Axis, data: xr.DataArray, warnings: Warnings) -> None:
         x, y = self.horizontal.values_at(data), vertical.values_at(data)
         colours = self.scale.rgba(data.values.ravel())
         area = float(np.clip(6000 / x.size, 4, 60))
         axes.scatter(x, y, c=colours, s=area, rasterized=x.size > 5000)
-        dark = look.is_dark(colours)
-        for warning in warnings:
-            cells = warning.cells.transpose(*data.dims).values.ravel()
-            for colour, where in (("white", cells & dark), ("black", cells & ~dark)):
+        for warning, cells in warnings:
+            for colour, where in _in_contrast(cells.values.ravel(), colours):
                 axes.scatter(x[where], y[where], s=area / 3, c=colour, marker=warning.marker, linewidths=0.6)
 
-    def _draw_cells(self, axes: Axes, data: xr.DataArray, warnings: list[CellWarning]) -> None:
-        scale = self.scale
+    def _draw_cells(self, axes: Axes, data: xr.DataArray, warnings: Warnings) -> None:
         x, y = self.horizontal.edges, self.vertical.edges if self.vertical else np.array([0.0, 1.0])
         numbers = as_matrix(data, self.horizontal, self.vertical)
-        colours = scale.rgba(numbers)
-        if isinstance(scale.norm, LogNorm):
+        colours = self.scale.rgba(numbers)
+        if isinstance(self.scale.norm, LogNorm):
             axes.pcolormesh(x, y, colours, rasterized=True)
         else:
-            axes.pcolormesh(x, y, np.ma.masked_invalid(numbers), cmap=scale.colours, norm=scale.norm, rasterized=True)
-        dark = look.is_dark(colours)
-        for warning in warnings:
-            cells = as_matrix(warning.cells, self.horizontal, self.vertical)
-            for colour, where in (("white", cells & dark), ("black", cells & ~dark)):
-                if where.any():
-                    style: dict[str, Any] = {"edgecolor": colour, "hatch": warning.hatch, "hatch_linewidth": 0.5}
-                    patch = PathPatch(_outline(where, x, y), fill=False, linewidth=0, **style)
-                    # add_patch would visit every rectangle to update the limits of the axes, which are known.
-                    axes.add_artist(patch)
-        if data.name == "origin":
-            self._mark_audited(axes, data)
+            palette: dict[str, Any] = {"cmap": self.scale.colours, "norm": self.scale.norm}
+            axes.pcolormesh(x, y, np.ma.masked_invalid(numbers), rasterized=True, **palette)
+        for warning, cells in warnings:
+            for colour, where in _in_contrast(as_matrix(cells, self.horizontal, self.vertical), colours):
+                style: dict[str, Any] = {"edgecolor": colour, "hatch": warning.hatch, "hatch_linewidth": 0.5}
+                # add_patch would visit every rectangle to update the limits of the axes, which are known.
+                axes.add_artist(PathPatch(_outline(where, x, y), fill=False, linewidth=0, **style))
         if self.vertical is None:
             axes.set_yticks([])
+        elif data.name == "origin":
+            self._mark_audited(axes, self.vertical, data)
 
-    def _mark_audited(self, axes: Axes, data: xr.DataArray) -> None:
+    def _mark_audited(self, axes: Axes, vertical: Axis, data: xr.DataArray) -> None:
         """Mark audited cells, which are smaller than a dot of a large map."""
-        if self.vertical is None:
-            return
-        audited = as_matrix(data == AUDITED, self.horizontal, self.vertical)
-        row, column = np.nonzero(audited)
+        row, column = np.nonzero(as_matrix(data == AUDITED, self.horizontal, vertical))
         colour = self.scale.colours(int(np.flatnonzero(np.asarray(self.scale.flags) == AUDITED)[0]))
         style: dict[str, Any] = {"edgecolors": "black", "linewidths": 0.3, "s": 9, "rasterized": len(row) > 2000}
-        axes.scatter(self.horizontal.values[column], self.vertical.values[row], color=colour, **style)
+        axes.scatter(self.horizontal.values[column], vertical.values[row], color=colour, **style)
 
     def draw_alone(self, axes: Axes, title: bool | str = True, legend: bool | str = True) -> None:
         """Draw a map of one panel with labels, title, colour bar and legend."""
@@ -491,7 +468,7 @@ class Map:
                 "sel", f"one panel cannot show {left}: hold it, or draw regime_map, which makes a panel for each value"
             )
         self.draw(axes, self.panels[0][1])
-        self.label_axes(axes)
+        look.label_axes(axes, self.horizontal.label, self.vertical_label)
         bar = self.scale.meanings is None and self.vertical is not None
         if bar:
             self.add_colour_bar([axes])
@@ -502,10 +479,6 @@ class Map:
         text = self.title_text(title, look.width_of(axes) - look.MARGIN - beside)
         axes.set_title(text, fontsize="medium")
         look.place_legend(axes, self.entries, legend, handleheight=1.4)
-
-    def label_axes(self, axes: Axes) -> None:
-        """Write the labels of both axes."""
-        look.label_axes(axes, self.horizontal.label, self.vertical_label)
 
     def add_colour_bar(self, panels: list[Axes]) -> None:
         """Draw one colour bar beside the panels."""
@@ -544,6 +517,12 @@ def _panels(ds: xr.Dataset, dims: list[str]) -> list[tuple[list[str], dict[str, 
         index = dict(zip(dims, map(int, position), strict=True))
         panels.append(([labels.value_text(ds[dim][k]) for dim, k in index.items()], index))
     return panels
+
+
+def _in_contrast(cells: NDArray[Any], colours: NDArray[Any]) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Which of some cells are marked in white, and which in black, so that the marks stand out from the colours."""
+    dark = look.is_dark(colours)
+    return [(colour, where) for colour, where in (("white", cells & dark), ("black", cells & ~dark)) if where.any()]
 
 
 def _outline(cells: NDArray[Any], x: NDArray[Any], y: NDArray[Any]) -> Outline:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -163,7 +163,7 @@ class _Sweep:
             ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG, ds[var]))
             if ds[var].size < whole[var].size:
                 notes.append(f"1 cell in {whole[var].size / ds[var].size:.0f} shown; shares are those of all cells")
-            axes = [replace(Axis.of(ds[axis.name], ds), scale=axis.scale) for axis in axes]
+            axes = [axis.within(ds) for axis in axes]
         dims = list(dict.fromkeys(dim for axis in axes for dim in axis.dims))
         slices = [str(dim) for dim in ds[var].dims if dim not in dims]
         ds, whole = (one.transpose(*slices, *dims, ...) for one in (ds, whole))
