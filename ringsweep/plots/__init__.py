@@ -12,10 +12,9 @@ from ringsweep.plots.films import animation, save_animation
 from ringsweep.plots.fits import fit
 from ringsweep.plots.histories import history, history_panel
 from ringsweep.plots.look import REGIME_COLOURS, style
-from ringsweep.plots.loops import friction_loop
 from ringsweep.plots.maps import map_panel, regime_map
 from ringsweep.plots.page import save_page
-from ringsweep.plots.phase import phase_portrait
+from ringsweep.plots.phase import friction_loop, phase_portrait
 from ringsweep.plots.polar import polar_view
 from ringsweep.plots.precision import precision_panel, work_precision
 from ringsweep.plots.probability import probability_panel, sensitivity_panel, survival_panel

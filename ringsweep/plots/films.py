@@ -19,10 +19,9 @@ from PIL import Image
 
 from ringsweep.errors import InputError
 from ringsweep.plots import datasets, look
-from ringsweep.plots.belt import BeltArtists
 from ringsweep.plots.histories import draw_panel, time_limits
 from ringsweep.plots.labels import axis_label
-from ringsweep.plots.polar import RingArtists, states_at
+from ringsweep.plots.polar import BeltArtists, RingArtists, states_at
 from ringsweep.plots.rig import belt_history, ring_history
 from ringsweep.plots.saving import suffix_of
 from ringsweep.storage.files import check_writable, replacing

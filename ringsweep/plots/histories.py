@@ -8,12 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from matplotlib import rcParams
+from matplotlib import colors, patches, rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ringsweep.plots import datasets, look
@@ -241,33 +239,29 @@ def draw_panel(
     """
     look.small_ticks(axes)
     time, names = ds["time"].values, tuple(datasets.present(ds, names))
-    explain_shading = explain_shading or names[0] in datasets.PANELS
+    first, explain_shading = names[0], explain_shading or names[0] in datasets.PANELS
     if "mode" in ds and band is None:
-        at, phase = _by_interval(time, datasets.phases(ds))
-        for value, shade in _shades().items():
-            spans = [(at[i], at[j] - at[i]) for i, j in look.true_ranges(phase == value)]
-            label = datasets.mode_name(value) if explain_shading and spans else None
-            axes.broken_barh(spans, (0, 1), transform=axes.get_xaxis_transform(), linewidth=0, label=label, **shade)
-    if names == ("impact_speed",):
+        _shade(axes, time, datasets.phases(ds), explain_shading)
+    if first == "impact_speed":
         _draw_impacts(axes, ds)
-        return
-    for name, colour, style in zip(names, look.PAIR_COLOURS, look.PAIR_STYLES, strict=False):
-        numbers = displayed(ds[name]).values
-        if band is not None:
-            _draw_range(axes, time, numbers, band, color=look.on_page(colour), label=_LEGEND.get(name))
-            continue
-        curve = _envelope(time, numbers)
-        axes.plot(*curve, color=look.on_page(colour), linestyle=style, linewidth=1, label=_LEGEND.get(name))
-    _mark_separation(axes, ds, names)
+    else:
+        for k, name in enumerate(names):
+            curve = {"color": look.pair(k), "label": _LEGEND.get(name)}
+            numbers = displayed(ds[name]).values
+            if band is not None:
+                _draw_range(axes, time, numbers, band, **curve)
+            else:
+                axes.plot(*_envelope(time, numbers), linestyle=look.PAIR_STYLES[k], linewidth=1, **curve)
+        _mark_separation(axes, ds, names)
     look.legend_above(axes)
-    axes.set_ylabel(_short_label(ds, names[0]))
-    if names[0].startswith("gap"):
-        label_axis(axes.yaxis, _SHORT_NAMES[names[0]], unit_text(ds[names[0]]))
+    axes.set_ylabel(_short_label(ds, first))
+    if first.startswith("gap"):
+        label_axis(axes.yaxis, _SHORT_NAMES[first], unit_text(ds[first]))
     axes.margins(x=0)
-    if time_limits(ds)[1] > time[-1]:
+    if first == "impact_speed" or time_limits(ds)[1] > time[-1]:
         axes.set_xlim(*time_limits(ds))
-    if names[0] in _CLIPPED:
-        clip(axes, time, displayed(ds[names[0]]).values, "left" if explain_shading else "right")
+    if first in _CLIPPED:
+        clip(axes, time, displayed(ds[first]).values, "left" if explain_shading else "right")
 
 
 def _cycles(ds: xr.Dataset) -> NDArray[np.intp]:
@@ -297,13 +291,16 @@ def _draw_range(
     axes.fill_between(edges, np.append(low, low[-1]), np.append(high, high[-1]), **style, **options)
 
 
-def _shades() -> dict[int, dict[str, Any]]:
-    """Shading of times by phase."""
-    return {
-        0: {"color": look.on_page(look.STICK)},
-        datasets.PIVOT: {"color": look.OPEN, "alpha": 0.18},
-        datasets.FLIGHT: {"color": look.OPEN, "alpha": 0.45},
-    }
+def _shade(axes: Axes, time: NDArray[Any], phases: NDArray[Any], explain: bool) -> None:
+    """Shade times of stick and of open contacts; the legend may explain the shading."""
+    edges, phase = _by_interval(time, phases)
+    stick = look.on_page(look.STICK)
+    shades = ((0, stick, 1.0), (datasets.PIVOT, look.OPEN, 0.18), (datasets.FLIGHT, look.OPEN, 0.45))
+    for value, colour, alpha in shades:
+        spans = [(edges[i], edges[j] - edges[i]) for i, j in look.true_ranges(phase == value)]
+        style: dict[str, Any] = {"color": colour, "alpha": alpha}
+        style["label"] = datasets.mode_name(value) if explain and spans else None
+        axes.broken_barh(spans, (0, 1), transform=axes.get_xaxis_transform(), linewidth=0, **style)
 
 
 def _draw_impacts(axes: Axes, ds: xr.Dataset) -> None:
@@ -311,16 +308,12 @@ def _draw_impacts(axes: Axes, ds: xr.Dataset) -> None:
     first, last = map(float, ds["time"].values[[0, -1]])
     time, contact, speed = (ds[name].values for name in ("impact_time", "impact_contact", "impact_speed"))
     shown = (first <= time) & (time <= last) & (speed > _WEAKEST * speed.max(initial=0.0))
-    colours = [*map(look.on_page, look.PAIR_COLOURS), look.on_page("black")]
-    for which, colour, marker, label in zip((1, 2, 3), colours, "+x*", ("contact 1", "contact 2", "both"), strict=True):
+    colours = [look.pair(0), look.pair(1), look.on_page("black")]
+    for which, colour, mark, label in zip((1, 2, 3), colours, "+x*", ("contact 1", "contact 2", "both"), strict=True):
         here = shown & (contact == which)
         if here.any():
-            axes.plot(time[here], speed[here], marker=marker, color=colour, linestyle="", markersize=4, label=label)
-    look.legend_above(axes)
-    if shown.any():
-        axes.set_yscale("log")
-    axes.set_ylabel(_short_label(ds, "impact_speed"))
-    axes.set_xlim(*time_limits(ds))
+            axes.plot(time[here], speed[here], mark, color=colour, markersize=4, label=label)
+            axes.set_yscale("log")
 
 
 def time_limits(ds: xr.Dataset) -> tuple[float, float]:
@@ -335,20 +328,18 @@ def _mark_separation(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None
     """Mark where a contact separates first, in the panel of the normal reactions."""
     if not {"separating_contact", "t_separation"} <= set(ds.variables):
         return
-    which, instant = int(ds["separating_contact"]), float(ds["t_separation"])
-    ending = [name for name in names if name in (f"normal_{which}", *("normal_1", "normal_2")[: 2 * (which == 3)])]
+    which, instant, time = int(ds["separating_contact"]), float(ds["t_separation"]), ds["time"].values
     # A part of a run may have no separation.
-    first, last = ds["time"].values[[0, -1]]
-    if not ending or not first <= instant <= last * (1.0 + 1e-9):
+    if not time[0] <= instant <= time[-1] * (1.0 + 1e-9):
         return
-    contact = "both contacts separate" if which == 3 else f"contact {which} separates"
-    text = f"{contact}, t = {number_text(instant, '.4g')} s"
-    for name in ending:
-        known = np.isfinite(ds[name].values) & (ds["time"].values <= instant * (1.0 + 1e-9))
-        reaction = ds[name].values[known][-1]
-        style: dict[str, Any] = {"marker": "o", "markersize": 5, "markerfacecolor": "none", "clip_on": False}
-        axes.plot([instant], [reaction], color=look.on_page("black"), linestyle="", zorder=5, label=text, **style)
-        text = "_"
+    text = "both contacts separate" if which == 3 else f"contact {which} separates"
+    text += f", t = {number_text(instant, '.4g')} s"
+    style: dict[str, Any] = {"color": look.on_page("black"), "markerfacecolor": "none", "markersize": 5, "zorder": 5}
+    for name in names:
+        if name == f"normal_{which}" or (which == 3 and name.startswith("normal")):
+            known = np.isfinite(ds[name].values) & (time <= instant * (1.0 + 1e-9))
+            axes.plot([instant], [ds[name].values[known][-1]], "o", clip_on=False, label=text, **style)
+            text = "_"
 
 
 def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
@@ -445,14 +436,16 @@ def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
     strip = np.array([_by_interval(ds["time"].values, ds[name].values)[1] for name in names])
     arcs = int(max(1, strip.max()))
     colours = [look.on_page(look.REST), *(look.arc_colour(k + 1) for k in range(arcs))]
-    norm = BoundaryNorm(np.arange(arcs + 2) - 0.5, arcs + 1)
-    axes.pcolormesh(at, np.arange(len(names) + 1), strip, cmap=ListedColormap(colours), norm=norm, rasterized=True)
+    norm = colors.BoundaryNorm(np.arange(arcs + 2) - 0.5, arcs + 1)
+    axes.pcolormesh(
+        at, np.arange(len(names) + 1), strip, cmap=colors.ListedColormap(colours), norm=norm, rasterized=True
+    )
     axes.hlines(range(1, len(names)), at[0], at[-1], color=look.page_colour(), linewidth=2)
     axes.set_yticks(np.arange(len(names)) + 0.5, labels=[f"contact {name[-1]}" for name in names], fontsize=look.SMALL)
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
     surfaces = zip(colours, ["elsewhere", *look.arc_names(arcs)], strict=True)
-    handles: list[Artist] = [Patch(facecolor=colour, edgecolor="0.7", label=name) for colour, name in surfaces]
+    handles: list[Artist] = [patches.Patch(facecolor=colour, edgecolor="0.7", label=name) for colour, name in surfaces]
     look.legend_above(axes, handles)
     axes.tick_params(axis="x", labelsize=look.SMALL)
 

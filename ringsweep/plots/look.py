@@ -9,12 +9,11 @@ from typing import Any, Literal
 
 import matplotlib
 import numpy as np
+from matplotlib import colors, transforms
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.gridspec import SubplotParams
 from matplotlib.legend import Legend
-from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -174,10 +173,10 @@ def figure_width() -> float:
 
 def on_page(colour: Any) -> Any:
     """A colour as it is drawn on the page: on a dark page greys are inverted, and other colours are lighter."""
-    ink, page = np.array(to_rgb(matplotlib.rcParams["text.color"])), np.array(to_rgb(page_colour()))
+    ink, page = np.array(colors.to_rgb(matplotlib.rcParams["text.color"])), np.array(colors.to_rgb(page_colour()))
     if page.mean() > ink.mean():
         return colour
-    given = np.array(to_rgb(colour))
+    given = np.array(colors.to_rgb(colour))
     mixed = ink + given.mean() * (page - ink) if np.ptp(given) < 0.02 else 0.6 * given + 0.4
     return tuple(map(float, mixed))
 
@@ -192,7 +191,7 @@ def page_colour() -> Any:
     for key in ("axes.facecolor", "figure.facecolor"):
         if (colour := matplotlib.rcParams[key]) != "none":
             return colour
-    return "white" if np.mean(to_rgb(matplotlib.rcParams["text.color"])) < 0.5 else "black"
+    return "white" if np.mean(colors.to_rgb(matplotlib.rcParams["text.color"])) < 0.5 else "black"
 
 
 def arc_colour(number: int) -> str:
@@ -321,7 +320,7 @@ def place_legend(ax: Axes, handles: list[Artist], where: bool | str = True, **op
         size, lines = matplotlib.rcParams["font.size"], 1 + ax.get_xlabel().count("\n")
         figure: Any = ax.figure
         # Below ticks, their labels, and the label of the axis.
-        below = ScaledTranslation(0.0, -(8.0 + (1.0 + 1.25 * lines) * size) / 72.0, figure.dpi_scale_trans)
+        below = transforms.ScaledTranslation(0.0, -(8.0 + (1.0 + 1.25 * lines) * size) / 72.0, figure.dpi_scale_trans)
         columns = columns_of(handles, width_of(ax))
         at: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "columnspacing": 1.2}
         ax.legend(**common, **at, bbox_transform=ax.transAxes + below, ncols=columns)

@@ -8,11 +8,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import colormaps
+from matplotlib import colormaps, colors, lines, patches
 from matplotlib.artist import Artist
-from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_rgb
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -26,8 +23,8 @@ from ringsweep.quantities.variables import INFERRED, SAMPLED, configuration_of, 
 class ColourScale:
     """Colours of the values of a variable; `flags` and `meanings` are those of a classification."""
 
-    colours: Colormap
-    norm: Normalize
+    colours: colors.Colormap
+    norm: colors.Normalize
     flags: NDArray[Any] | None = None
     meanings: tuple[str, ...] | None = None
 
@@ -48,20 +45,20 @@ class ColourScale:
             if norm == "log" and (not positive.size or finite.min() < 0.0):
                 raise InputError("norm", f"{data.name} has no logarithm: its values are not positive")
             if positive.size and positive.max() > positive.min() and _is_logarithmic(data, finite, norm):
-                return cls(palette.with_extremes(under=ZERO), LogNorm(positive.min(), positive.max()))
+                return cls(palette.with_extremes(under=ZERO), colors.LogNorm(positive.min(), positive.max()))
             if str(data.name) in SAMPLED and data.dtype.kind == "f" and norm is None:
                 # Shares: every map of them has the same colours.
-                return cls(palette, Normalize(0.0, 1.0))
+                return cls(palette, colors.Normalize(0.0, 1.0))
             limits = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
-            return cls(palette, Normalize(*limits))
+            return cls(palette, colors.Normalize(*limits))
         meanings = meanings_of(data)
         # The colour of a class does not depend on which other classes occur.
         colours = [
             _WORDS.get(m, look.CLASS_COLOURS[k % len(look.CLASS_COLOURS)]) for k, m in enumerate(meanings.values())
         ]
-        classes = BoundaryNorm(np.arange(len(meanings) + 1) - 0.5, len(meanings))
+        classes = colors.BoundaryNorm(np.arange(len(meanings) + 1) - 0.5, len(meanings))
         names = tuple(meaning.replace("_", " ") for meaning in meanings.values())
-        return cls(_with_grey(ListedColormap(colours)), classes, np.array(list(meanings)), names)
+        return cls(_with_grey(colors.ListedColormap(colours)), classes, np.array(list(meanings)), names)
 
     def numbers(self, data: xr.DataArray) -> xr.DataArray:
         """Numbers for `norm`: the value, or the position of its flag; NaN where there is none."""
@@ -75,7 +72,7 @@ class ColourScale:
 
     def rgba(self, numbers: NDArray[Any]) -> NDArray[Any]:
         """Colours of such numbers, shape ``(..., 4)``."""
-        if isinstance(self.norm, LogNorm):
+        if isinstance(self.norm, colors.LogNorm):
             # A zero has no logarithm, and the colour of what lies below the scale.
             numbers = np.where(numbers <= 0.0, 0.5 * float(self.norm.vmin or 0.0), numbers)
         return np.asarray(self.colours(self.norm(np.ma.masked_invalid(numbers))))
@@ -197,7 +194,7 @@ def legend_entries(
 
     def add(where: NDArray[Any], label: str, colour: Any) -> None:
         if where.any():
-            entries.append(Patch(color=colour, label=f"{label}, {_share(where)}"))
+            entries.append(patches.Patch(color=colour, label=f"{label}, {_share(where)}"))
 
     shown = np.isfinite(data.values)
     if scale.flags is not None and scale.meanings is not None:
@@ -207,25 +204,27 @@ def legend_entries(
     if not shown.all():
         other = ~shown & ~_inferred_apart(ds, data).values
         add(other, missing_text(ds, data), look.on_page(look.NO_VALUE))
-    if isinstance(scale.norm, LogNorm):
+    if isinstance(scale.norm, colors.LogNorm):
         add(data.values == 0.0, "exactly 0", ZERO)
     ink = look.on_page("black")
     for warning in warnings:
         label = f"{warning.label}, {_share(warning.cells.values)}"
         if warning.everywhere:
-            entries.append(Line2D([], [], linestyle="", label=warning.label if "certify is" in label else label))
+            entries.append(lines.Line2D([], [], linestyle="", label=warning.label if "certify is" in label else label))
         elif scattered:
-            entries.append(Line2D([], [], color=ink, linestyle="", marker=warning.marker, label=label))
+            entries.append(lines.Line2D([], [], color=ink, linestyle="", marker=warning.marker, label=label))
         else:
-            entries.append(Patch(facecolor="none", edgecolor=ink, hatch=warning.hatch, linewidth=0.5, label=label))
+            entries.append(
+                patches.Patch(facecolor="none", edgecolor=ink, hatch=warning.hatch, linewidth=0.5, label=label)
+            )
             entries[-1].set(hatch_linewidth=0.5)
     return entries
 
 
-def _with_grey(colours: str | Colormap) -> Colormap:
+def _with_grey(colours: str | colors.Colormap) -> colors.Colormap:
     """A colour map with grey for missing values."""
     palette = colormaps[colours] if isinstance(colours, str) else colours
-    return palette.with_extremes(bad=to_rgb(look.on_page(look.NO_VALUE)))
+    return palette.with_extremes(bad=colors.to_rgb(look.on_page(look.NO_VALUE)))
 
 
 def _share(mask: NDArray[Any]) -> str:

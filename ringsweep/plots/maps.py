@@ -9,17 +9,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import rcParams
+from matplotlib import cm, colors, patches, patheffects, rcParams, ticker
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -43,7 +38,7 @@ _CURVE: dict[str, Any] = {
     "color": "black",
     "linewidth": 0.8,
     # Visible on dark cells too.
-    "path_effects": [withStroke(linewidth=2.0, foreground="white")],
+    "path_effects": [patheffects.withStroke(linewidth=2.0, foreground="white")],
 }
 
 
@@ -420,7 +415,7 @@ class Map:
         if levels:
             styles = [_LEVELS[level] for level in levels]
             curves = axes.contour(x, y, numbers, levels, colors="white", linewidths=1.2, linestyles=styles)
-            stroke: list[Any] = [withStroke(linewidth=2.2, foreground="#404040")]
+            stroke: list[Any] = [patheffects.withStroke(linewidth=2.2, foreground="#404040")]
             curves.set_path_effects(stroke)
             for text in axes.clabel(curves, fmt=lambda level: f"{level:.0%}", fontsize=look.SMALL):
                 text.set_path_effects(stroke)
@@ -438,7 +433,7 @@ class Map:
         x, y = self.horizontal.edges, self.vertical.edges if self.vertical else np.array([0.0, 1.0])
         numbers = as_matrix(data, self.horizontal, self.vertical)
         colours = self.scale.rgba(numbers)
-        if isinstance(self.scale.norm, LogNorm):
+        if isinstance(self.scale.norm, colors.LogNorm):
             axes.pcolormesh(x, y, colours, rasterized=True)
         else:
             palette: dict[str, Any] = {"cmap": self.scale.colours, "norm": self.scale.norm}
@@ -447,7 +442,7 @@ class Map:
             for colour, where in _in_contrast(as_matrix(cells, self.horizontal, self.vertical), colours):
                 style: dict[str, Any] = {"edgecolor": colour, "hatch": warning.hatch, "hatch_linewidth": 0.5}
                 # add_patch would visit every rectangle to update the limits of the axes, which are known.
-                axes.add_artist(PathPatch(_outline(where, x, y), fill=False, linewidth=0, **style))
+                axes.add_artist(patches.PathPatch(_outline(where, x, y), fill=False, linewidth=0, **style))
         if self.vertical is None:
             axes.set_yticks([])
         elif data.name == "origin":
@@ -482,8 +477,8 @@ class Map:
 
     def add_colour_bar(self, panels: list[Axes]) -> None:
         """Draw one colour bar beside the panels."""
-        bar = ScalarMappable(self.scale.norm, self.scale.colours)
-        ticks = MaxNLocator(integer=True) if self.data.dtype.kind in "iu" else None
+        bar = cm.ScalarMappable(self.scale.norm, self.scale.colours)
+        ticks = ticker.MaxNLocator(integer=True) if self.data.dtype.kind in "iu" else None
         height = 0.75 * look.height_of(panels[0]) * (1 + (len(panels) > 1))
         look.colour_bar(bar, panels, look.folded([labels.axis_label(self.data, self.ds)], height), ticks)
 

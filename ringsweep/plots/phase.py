@@ -1,4 +1,4 @@
-"""Phase portraits of runs."""
+"""Phase portraits of runs, and friction forces over sliding."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from matplotlib import rcParams
+from matplotlib import patches, rcParams, transforms
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots import look
 from ringsweep.plots.datasets import FLIGHT, PIVOT, mode_name, on_ring, require_history, zones
+from ringsweep.plots.histories import clip
 from ringsweep.plots.labels import label_axis
 from ringsweep.plots.rig import Rig, belt_history, ring_history
 
@@ -38,6 +37,9 @@ _MODE_STYLES: dict[int, dict[str, Any]] = {
 
 # Range of an angle above which it is shown modulo a full turn, turns.
 _LONGEST = 2.0
+
+# Share of the greatest velocity that the inset of a friction loop shows.
+_NEAR = 0.02
 
 
 def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax: Axes | None = None) -> Axes:
@@ -79,13 +81,17 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     """
     if frame not in ("space", "ring"):
         raise InputError("frame", f"{frame!r} is neither 'space' nor 'ring'")
-    if on_ring(require_history(ds)):
-        return _ring_portrait(ds, frame, ax)
-    if frame == "ring":
+    if ringed := on_ring(require_history(ds)):
+        run, rig = ring_history(ds)
+    elif frame == "ring":
         raise InputError("frame", "'ring' is for a body in a ring; on a belt the frame is 'space'")
-    run = belt_history(ds)
+    else:
+        run = belt_history(ds)
     ax = look.axes_or_current(ax, 0.9 if look.is_narrow(look.figure_width()) else 0.63)
-    look.place_legend(ax, draw_belt_portrait(ax, run))
+    if ringed:
+        _draw_ring_portrait(ax, run, rig, frame == "ring")
+    else:
+        look.place_legend(ax, draw_belt_portrait(ax, run))
     look.make_room(ax)
     return ax
 
@@ -94,44 +100,31 @@ def draw_belt_portrait(ax: Axes, run: xr.Dataset) -> list[Artist]:
     """Draw velocity over displacement of a run of :func:`belt_history`; returns the legend entries."""
     look.small_ticks(ax)
     place, speed, belt_speed = (run[name].values for name in ("x", "velocity", "belt_velocity"))
-    if fixed := not np.ptp(belt_speed):
-        ax.axhline(belt_speed[0], **_driven_style(fixed))
-    else:
-        ax.plot(place, belt_speed, **_driven_style(fixed))
-    entries: list[Artist] = [Line2D([], [], **_driven_style(fixed), label="speed of the belt")]
+    entries = [_draw_driven(ax, "belt", place, belt_speed, not np.ptp(belt_speed))]
     entries += draw_modes(ax, run["mode"].values, place, speed)
     label_axis(ax.xaxis, "displacement", "m")
     label_axis(ax.yaxis, "velocity", "m s$^{-1}$")
     return entries
 
 
-def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
-    """Draw angular velocity over angle."""
-    run, rig = ring_history(ds)
-    ax = look.axes_or_current(ax, 0.9 if look.is_narrow(look.figure_width()) else 0.63)
+def _draw_ring_portrait(ax: Axes, run: xr.Dataset, rig: Rig, relative: bool) -> None:
+    """Draw angular velocity over angle, `relative` to the ring or not."""
     factor, unit = look.angle_unit()
-    relative = frame == "ring"
-    fixed_arcs = relative or not run["theta"].values.any()
-    angle = factor * (run["phi"].values - run["theta"].values if relative else run["phi"].values)
-    speed = run["omega"].values - run["ring_omega"].values if relative else run["omega"].values
+    angle, speed, theta, driven = (run[name].values for name in ("phi", "omega", "theta", "ring_omega"))
+    fixed_arcs = relative or not theta.any()
+    if relative:
+        angle, speed, driven = angle - theta, speed - driven, 0.0 * driven
+    angle = factor * angle
     wrapped = bool(np.ptp(angle) > _LONGEST * _turn())
     entries = _draw_bands(ax, rig, angle, wrapped) if fixed_arcs else []
-    if not entries:
-        entries = _draw_broad_lines(ax, run, angle, speed, wrapped)
-    ring_style = _driven_style(fixed_arcs)
-    if fixed_arcs:
-        ax.axhline(0.0, **ring_style)
-    else:
-        ax.plot(*_curve(angle, run["ring_omega"].values, wrapped), **ring_style)
-    entries.append(Line2D([], [], **ring_style, label="speed of the ring" + (", stick" if relative else "")))
+    entries = entries or _draw_broad_lines(ax, run, angle, speed, wrapped)
+    name = "ring, stick" if relative else "ring"
+    entries.append(_draw_driven(ax, name, *_curve(angle, driven, wrapped), constant=fixed_arcs))
     jumps = np.diff(run["time"].values) == 0.0
     jumps &= np.abs(np.diff(speed)) > 1e-6 * np.ptp(speed)
     entries += draw_modes(ax, run["mode"].values, angle, speed, wrapped, jumps)
-    look.label_axes(
-        ax,
-        f"angle of the body{' on the ring' if relative else ''} ({unit})",
-        f"angular velocity{' relative to the ring' if relative else ''} (rad s$^{{-1}}$)",
-    )
+    across, up = (" on the ring", " relative to the ring") if relative else ("", "")
+    look.label_axes(ax, f"angle of the body{across} ({unit})", f"angular velocity{up} (rad s$^{{-1}}$)")
     if wrapped:
         ax.set_xlim(-0.5 * _turn(), 0.5 * _turn())
         if unit == "°":
@@ -143,16 +136,16 @@ def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
         second.tick_params(labelsize=look.SMALL)
     figure: Any = ax.figure
     # The second axis has its labels between axes and legend.
-    labels = ScaledTranslation(0.065 * rcParams["font.size"] * relative, 0.0, figure.dpi_scale_trans)
-    look.place_legend(ax, entries, bbox_transform=ax.transAxes + labels, handleheight=1.2)
-    look.make_room(ax)
-    return ax
+    room = transforms.ScaledTranslation(0.065 * rcParams["font.size"] * relative, 0.0, figure.dpi_scale_trans)
+    look.place_legend(ax, entries, bbox_transform=ax.transAxes + room, handleheight=1.2)
 
 
-def _driven_style(constant: bool) -> dict[str, Any]:
-    """Line of the speed of ring or belt; a thin one over the broad curve of the body in stick, which would hide it."""
-    style: dict[str, Any] = {"color": look.pair(1), "linewidth": 0.8, "zorder": 2.5}
-    return style | {"linestyle": look.PAIR_STYLES[1], "linewidth": 1.2} if constant else style
+def _draw_driven(ax: Axes, name: str, across: NDArray[Any], up: NDArray[Any], constant: bool) -> Artist:
+    """Draw the speed of ring or belt: thin, over the broad curve of the body in stick, which would hide it."""
+    style: dict[str, Any] = {"color": look.pair(1), "linewidth": 0.8, "zorder": 2.5, "label": f"speed of the {name}"}
+    if not constant:
+        return ax.plot(across, up, **style)[0]
+    return ax.axhline(up[0], **style | {"linestyle": look.PAIR_STYLES[1], "linewidth": 1.2})
 
 
 def draw_modes(
@@ -248,7 +241,7 @@ def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[
             for left, right in _every_turn(middle - half, middle + half, low, high):
                 ax.axvspan(left, right, zorder=0.5, **fill)
                 ax.axvspan(left, right, zorder=0.6, **hatch).set(hatch_linewidth=0.4)
-            entry = Patch(
+            entry = patches.Patch(
                 facecolor=look.arc_colour(number), alpha=0.55, hatch=lines, edgecolor=look.on_page("0.3"), linewidth=0
             )
             entry.set(label=f"contact {contact} on {name}", hatch_linewidth=0.4)
@@ -283,3 +276,84 @@ def _draw_broad_lines(
         ax.plot(*_curve(angle, speed + here, wrapped), zorder=1.5, **style)
         entries.append(Line2D([], [], label=f"a contact on {name}", **style))
     return entries
+
+
+def friction_loop(
+    ds: xr.Dataset, against: Literal["velocity", "distance"] = "velocity", ax: Axes | None = None
+) -> Axes:
+    """Draw the friction force on a belt over the sliding velocity, or over the distance slid.
+
+    A law of the sliding velocity alone gives one curve, and a vertical line where the body sticks. Bristles give loops,
+    which an inset shows at small velocities. Over the distance slid, the area of a closed loop is the energy that
+    friction takes in a cycle. For the loops of some cycles only, draw ``ds.sel(time=slice(...))``.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of :func:`ringsweep.simulate` on a belt.
+    against : {"velocity", "distance"}
+        Whether the horizontal axis has the sliding velocity, or the distance slid on the belt since the first instant
+        of `ds`. Forwards is positive for both.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure with
+        ``layout="constrained"`` makes room for it.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is not the history of one run on a belt, or `against` is unknown.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> from matplotlib.figure import Figure
+    >>> scene = {
+    ...     "model": "belt",
+    ...     "body": {"mass": 1.0},
+    ...     "spring": {"stiffness": 2.0},
+    ...     "belt": {"velocity": 0.1},
+    ...     "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
+    ...     "time": {"span": 60.0},
+    ... }
+    >>> friction_loop(ringsweep.simulate(scene), ax=Figure().add_subplot()).get_xlabel()
+    'sliding velocity (m s$^{-1}$)'
+    """
+    if against not in ("velocity", "distance"):
+        raise InputError("against", f"{against!r} is neither 'velocity' nor 'distance'")
+    run = belt_history(ds)
+    ax = look.axes_or_current(ax, 0.63)
+    if against == "velocity":
+        across = (run["velocity"] - run["belt_velocity"]).values
+        label = "sliding velocity", "m s$^{-1}$"
+    else:
+        across = (run["x"] - run["belt_x"]).values
+        across -= across[0]
+        label = "distance slid on the belt", "m"
+    force = run["friction_force"].values
+    entries = draw_modes(ax, run["mode"].values, across, force)
+    clip(ax, run["time"].values, force)
+    label_axis(ax.xaxis, *label)
+    label_axis(ax.yaxis, "friction force", "N")
+    if against == "velocity" and "deflection" in run and run["deflection"].values.any():
+        _draw_near_zero(ax, run["mode"].values, across, force)
+    look.place_legend(ax, entries)
+    return ax
+
+
+def _draw_near_zero(ax: Axes, mode: NDArray[Any], velocity: NDArray[Any], force: NDArray[Any]) -> None:
+    """Draw small velocities, at which bristles make loops, as an inset where friction, which opposes slip, never is."""
+    width = _NEAR * float(np.nanmax(np.abs(velocity)))
+    inset = ax.inset_axes((0.6, 0.24, 0.37, 0.36))
+    draw_modes(inset, mode, velocity, force)
+    for line in inset.lines:
+        line.set_linewidth(min(line.get_linewidth(), 0.9))
+        if line.get_marker() != "None":
+            line.set_visible(False)
+    inset.set(xlim=(-width, width), ylim=ax.get_ylim(), yticks=[])
+    look.small_ticks(inset)
+    label_axis(inset.xaxis, "near 0", "m s$^{-1}$")
+    inset.xaxis.label.set_fontsize(look.SMALL)

@@ -1,4 +1,4 @@
-"""The body in the ring at an instant, to scale, with all forces."""
+"""The body in the ring at an instant, to scale, with all forces; and on the belt, above its phase portrait."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib import lines, patches, patheffects, quiver
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch, Polygon, Wedge
-from matplotlib.patheffects import withStroke
-from matplotlib.quiver import Quiver
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
@@ -20,7 +17,8 @@ from ringsweep.errors import InputError
 from ringsweep.plots import look
 from ringsweep.plots.datasets import mode_name
 from ringsweep.plots.labels import MINUS, TIMES, number_text
-from ringsweep.plots.rig import Rig, ring_history
+from ringsweep.plots.phase import draw_belt_portrait
+from ringsweep.plots.rig import Rig, has_spring, ring_history
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 
@@ -32,6 +30,12 @@ _SHORTEST = 0.04
 
 # Length from which on the tip of a friction force is outside the ring, as a multiple of its radius.
 _LONG = 0.6
+
+
+# Heights in the picture, where the body stands on the belt at 0.
+_BODY, _SPRING, _BELT, _ARROW = 0.5, 0.25, -0.18, 0.08
+
+_FRICTION = "#009E73"
 
 
 def polar_view(ds: xr.Dataset, time: float | str, ax: Axes | None = None) -> Axes:
@@ -104,7 +108,7 @@ class Instant:
 
     def name_of_force(self, name: str, colour: Any) -> Text:
         """A name beside an arrow, visible on whatever lies below."""
-        halo = withStroke(linewidth=2.0, foreground=look.page_colour())
+        halo = patheffects.withStroke(linewidth=2.0, foreground=look.page_colour())
         return self.write(0.0, 0.0, name, fontsize=None, color=colour, zorder=8, path_effects=[halo])
 
     def draw_bar(self, left: float, y: float, length: float, texts: tuple[str, str], away: tuple[float, float]) -> None:
@@ -139,20 +143,20 @@ class RingArtists(Instant):
         ax.set(aspect="equal", xlim=(-1.55 * R, 1.55 * R), ylim=(-2.0 * R, 1.5 * R))
         edge, dark, ink = map(look.on_page, ("0.3", "0.2", "black"))
         surface: dict[str, Any] = {"width": 0.1 * R, "edgecolor": edge}
-        race = Wedge((0.0, 0.0), 1.1 * R, 0.0, 360.0, facecolor=look.on_page(look.REST), zorder=1, **surface)
+        race = patches.Wedge((0.0, 0.0), 1.1 * R, 0.0, 360.0, facecolor=look.on_page(look.REST), zorder=1, **surface)
         self._draw_angles()
         self.arcs = []
         for k, (_, half_angle) in enumerate(rig.arcs, start=1):
-            wedge = Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, facecolor=look.arc_colour(k), **surface)
+            wedge = patches.Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, facecolor=look.arc_colour(k), **surface)
             wedge.set(zorder=2, visible=half_angle > 0.0)
             self.arcs.append(wedge)
         self.mark, self.turning = (
-            Polygon(np.zeros((3, 2)), facecolor=dark, edgecolor="none", zorder=3) for _ in range(2)
+            patches.Polygon(np.zeros((3, 2)), facecolor=dark, edgecolor="none", zorder=3) for _ in range(2)
         )
         (self.turn,) = ax.plot([], [], color=dark, linewidth=1.2, zorder=3)
         (self.rod,) = ax.plot([], [], color=look.on_page("0.45"), linewidth=4, solid_capstyle="round", zorder=3)
         ball: dict[str, Any] = {"facecolor": look.on_page("0.85"), "edgecolor": dark, "linewidth": 1.2, "zorder": 4}
-        self.balls = [Circle((0.0, 0.0), rig.ball, **ball) for _ in rig.contacts]
+        self.balls = [patches.Circle((0.0, 0.0), rig.ball, **ball) for _ in rig.contacts]
         for patch in (race, *self.arcs, self.mark, self.turning, *self.balls):
             ax.add_patch(patch)
         # A single contact needs no number.
@@ -170,9 +174,9 @@ class RingArtists(Instant):
         surfaces = [(look.arc_colour(k), name) for k, name in enumerate(look.arc_names(len(rig.arcs)), start=1)]
         surfaces.append((look.on_page(look.REST), "elsewhere"))
         #: Entries of a legend for the surfaces and the mark; arrows have their names beside them.
-        self.entries: list[Artist] = [Patch(facecolor=one, edgecolor=edge, label=name) for one, name in surfaces]
+        self.entries: list[Artist] = [patches.Patch(fc=colour, ec=edge, label=name) for colour, name in surfaces]
         angle: dict[str, Any] = {"marker": "v", "color": dark, "linestyle": "", "markersize": 5}
-        self.entries.append(Line2D([], [], label="angle θ of the ring", **angle))
+        self.entries.append(lines.Line2D([], [], label="angle θ of the ring", **angle))
         #: Artists that :meth:`show` changes.
         self.moving: list[Artist] = [*self.arcs, self.mark, self.turn, self.turning, self.rod, *self.balls]
         self.moving += [*self.numbers, self.centre, self.reactions, self.frictions, self.gravity]
@@ -251,7 +255,7 @@ class RingArtists(Instant):
         for angle, name in (degrees if look.angle_unit()[1] == "°" else radians).items():
             self.write(*_point(1.37 * R, math.radians(angle)), name, color=look.on_page("0.35"), zorder=7)
 
-    def _arrows(self, colours: list[str], width: float) -> Quiver:
+    def _arrows(self, colours: list[str], width: float) -> quiver.Quiver:
         """An arrow of each colour; `width` is a multiple of the radius of the ring."""
         # With long heads short arrows would all look alike.
         arrow = ARROWS | {"headwidth": 3.2, "headlength": 3.6, "headaxislength": 3.2, "width": width * self.rig.radius}
@@ -268,6 +272,85 @@ class RingArtists(Instant):
         bars.append((length, f"{1000 * length:g} mm", ""))
         for x, (extent, *texts) in zip((-1.4 * R, -0.35 * R, 0.7 * R), bars, strict=False):
             self.draw_bar(x, -1.62 * R, extent, (texts[0], texts[1]), (0.05 * R, 0.08 * R))
+
+
+class BeltArtists(Instant):
+    """Artists of the body and the belt, and a dot in the phase portrait below. :meth:`show` moves them to an instant.
+
+    Places across are to scale, in m; both axes have the same range. Heights mean nothing.
+    """
+
+    def __init__(self, pair: tuple[Axes, Axes], run: xr.Dataset):
+        ax, below = pair
+        super().__init__(ax)
+        #: Entries of a legend for the phase portrait; the arrow has its name beside it.
+        self.entries = draw_belt_portrait(below, run)
+        x = run["x"].values
+        # The place of the relaxed spring is always in view.
+        low, high = min(0.0, float(x.min())), max(0.0, float(x.max()))
+        self.range = (high - low) or 1.0
+        self.half = 0.07 * self.range
+        self.wall = low - 0.45 * self.range
+        self.ends = left, right = self.wall - 0.05 * self.range, high + 0.35 * self.range
+        self.spacing = 0.125 * (right - left)
+        reference = reference_force([np.abs(run["friction_force"].values)], 1.0)
+        # Length of an arrow, m/N.
+        self.scale = 0.3 * self.range / reference
+        speeds = np.abs([run["velocity"].values, run["belt_velocity"].values])
+        self.digits = max(0, 2 - math.floor(math.log10(float(np.nanmax(speeds)) or 1.0)))
+
+        ax.set_ylim(-0.65, 0.95)
+        for axes in pair:
+            axes.set_xlim(left, right)
+        edge, dark, green = map(look.on_page, ("0.3", "0.2", _FRICTION))
+        self.body = patches.Rectangle(
+            (0.0, 0.0), 2 * self.half, _BODY, facecolor=look.on_page("0.85"), edgecolor=dark, zorder=4
+        )
+        belt = patches.Rectangle((left, _BELT), right - left, -_BELT, facecolor=look.on_page(look.REST), edgecolor=edge)
+        wall = patches.Rectangle((left, 0.0), self.wall - left, 0.7, facecolor=look.on_page("0.8"), edgecolor=edge)
+        for patch in (belt, wall, self.body):
+            ax.add_patch(patch)
+        (self.marks,) = ax.plot([], [], color=dark, linewidth=1.4, zorder=2)
+        (self.spring,) = ax.plot([], [], color=edge, linewidth=1.2, zorder=3, visible=has_spring(run))
+        if has_spring(run):
+            ax.plot([0.0, 0.0], [0.0, 0.66], color=look.on_page("0.5"), linewidth=0.8, linestyle=":", zorder=1)
+            self.write(0.0, 0.68, "spring relaxed", va="bottom", color=look.on_page("0.35"))
+        self.friction = ax.quiver(*np.zeros((4, 1)), color=green, units="width", width=0.01, **ARROWS)
+        self.name = self.name_of_force("$F$", green)
+        force = round_down(0.75 * reference)
+        bar = left + 0.03 * self.range, 0.78, force * self.scale
+        self.draw_bar(*bar, (f"$F$: {force:g} N", ""), (0.04, 0.0))
+        dot: dict[str, Any] = {"marker": "o", "markersize": 8, "markeredgewidth": 1.5, "markerfacecolor": look.pair(0)}
+        (self.dot,) = below.plot([], [], color=look.on_page("black"), linestyle="", zorder=7, **dot)
+        #: Artists that :meth:`show` changes.
+        self.moving: list[Artist] = [self.marks, self.spring, self.body, self.friction, self.name]
+        self.moving += [self.speeds, self.dot, ax.title]
+
+    def show(self, states: dict[str, NDArray[Any]], k: int) -> None:
+        """Move all artists to the `k`-th state of :func:`ringsweep.plots.polar.states_at`."""
+        x, velocity, force = (float(states[name][k]) for name in ("x", "velocity", "friction_force"))
+        self.body.set_x(x - self.half)
+        self.spring.set_data(*_zigzag(self.wall, x - self.half))
+        left, right = self.ends
+        marks = np.arange(left + (float(states["belt_x"][k]) - left) % self.spacing, right, self.spacing)
+        across = np.column_stack([marks, marks, np.full(len(marks), np.nan)]).ravel()
+        self.marks.set_data(across, np.tile([_BELT, 0.0, np.nan], len(marks)))
+        # The force counts positive against x.
+        self.friction.set_offsets([(x, _ARROW)])
+        self.friction.set_UVC([-force * self.scale], [0.0])
+        # Beyond the tip of the arrow.
+        self.name.set(x=x - force * self.scale - 0.03 * self.range * np.sign(force), y=_ARROW, visible=force != 0.0)
+        self.name.set_horizontalalignment("right" if force > 0.0 else "left")
+        self.tell(states, k, {"velocity": "body", "belt_velocity": "belt"}, self.digits, "m s⁻¹")
+        self.dot.set_data([x], [velocity])
+
+
+def _zigzag(left: float, right: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    """A spring between two places, m."""
+    coils = 10
+    share = np.concatenate([[0.0, 0.08], np.linspace(0.08, 0.92, 2 * coils + 2)[1:-1], [0.92, 1.0]])
+    side = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], coils), [0.0, 0.0]])
+    return left + share * (right - left), _SPRING + 0.12 * side
 
 
 def _point(radius: float, angle: Any) -> tuple[Any, Any]:

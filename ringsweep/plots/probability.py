@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import rcParams
+from matplotlib import patches, rcParams, ticker
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.patches import Patch
-from matplotlib.ticker import PercentFormatter
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -55,7 +53,7 @@ def probability_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     colours = [look.on_page(look.REGIME_COLOURS.get(word, look.NO_VALUE)) for word in words]
     _draw_bars(ax, ds, "probability", np.arange(len(words)), color=colours)
     _name_bars(ax, words)
-    ax.xaxis.set_major_formatter(PercentFormatter(1.0))
+    ax.xaxis.set_major_formatter(ticker.PercentFormatter(1.0))
     ax.set_xlabel("probability (95 % interval)")
     return ax
 
@@ -110,7 +108,7 @@ def survival_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     look.band(ax, time, ds["survival_low"].values, ds["survival_high"].values, colour, step="post")
     ax.step(time, ds["survival"].values, color=colour, where="post")
     ax.set_ylim(0.0, 1.02)
-    ax.yaxis.set_major_formatter(PercentFormatter(1.0))
+    ax.yaxis.set_major_formatter(ticker.PercentFormatter(1.0))
     what = "rides" if ds.attrs.get("survival_of") == "first_slip" else "holds its contacts"
     look.label_axes(ax, "time (s)", f"body still {what}")
     look.make_room(ax)
@@ -160,7 +158,7 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     for k, (name, text) in enumerate((("first", "first: alone"), ("total", "total: with the others"))):
         colour, place = look.pair(k), np.arange(ds.sizes["parameter"]) + 0.4 * k - 0.2
         _draw_bars(ax, ds, f"sobol_{name}", place, height=0.36, color=colour)
-        handles.append(Patch(color=colour, label=text))
+        handles.append(patches.Patch(color=colour, label=text))
     _name_bars(ax, list(map(str, ds["parameter"].values)))
     ax.set_xlabel("Sobol index (95 % interval)")
     title = [f"what {word} depends on", f"probability {float(ds['probability']):.1%}"]

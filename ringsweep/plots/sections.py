@@ -7,15 +7,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import rcParams
+from matplotlib import colors, lines, patches, rcParams, ticker, transforms
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
-from matplotlib.transforms import blended_transform_factory
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -161,7 +156,7 @@ def bifurcation_panel(ds: xr.Dataset, x: str | None = None, var: str | None = No
 def _strips(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
     """Draw the regimes as a strip at the upper edge for each direction, the first at the top; entries of a legend."""
     found: dict[str, Artist] = {}
-    across = blended_transform_factory(ax.transData, ax.transAxes)
+    across = transforms.blended_transform_factory(ax.transData, ax.transAxes)
     edges, branches = axis.edges, _branches(ds)
     for k, (_, branch) in enumerate(branches, start=1):
         regime = axis.along(words(branch["regime"])).astype(str)
@@ -170,7 +165,7 @@ def _strips(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
             spans = [(edges[a], edges[b] - edges[a]) for a, b in look.true_ranges(regime == word)]
             strip = (1.0 - k * _STRIP, _STRIP)
             ax.broken_barh(spans, strip, transform=across, facecolors=colour, linewidth=0, zorder=5)
-            found.setdefault(word, Patch(color=colour, label=word))
+            found.setdefault(word, patches.Patch(color=colour, label=word))
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + 1.3 * len(branches) * _STRIP * (high - low))
     return list(found.values())
@@ -216,7 +211,7 @@ def section_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     drawn = _scatter(ax, x[kept], velocity[kept], c=order, s=8.0, cmap="viridis")
     look.label_axes(ax, _label(ds, place), _label(ds, speed))
     if len(order) > 1:
-        look.colour_bar(drawn, [ax], "point, in time", MaxNLocator(6, integer=True))
+        look.colour_bar(drawn, [ax], "point, in time", ticker.MaxNLocator(6, integer=True))
     return ax
 
 
@@ -266,7 +261,7 @@ def _draw_exponents(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
             error = axis.along(branch["lyapunov_error"])
             look.band(ax, axis.values, finite - error, finite + error, look.pair(k))
         erased = axis.values[np.isneginf(value)]
-        edge = blended_transform_factory(ax.transData, ax.transAxes)
+        edge = transforms.blended_transform_factory(ax.transData, ax.transAxes)
         ax.plot(erased, np.full(len(erased), 0.03), "v", transform=edge, color=look.pair(k), markersize=2)
     _finish(ax, axis, "exponent (s$^{-1}$)")
     return []
@@ -357,7 +352,7 @@ def multiplier_circle(ds: xr.Dataset, x: str | None = None, ax: Axes | None = No
     ax.plot(np.cos(turn), np.sin(turn), color=frame, linewidth=0.8, zorder=1)
     for centred in (ax.axhline, ax.axvline):
         centred(0.0, color=frame, linewidth=0.4, zorder=1)
-    norm = (LogNorm if axis.scale == "log" else Normalize)(axis.edges[0], axis.edges[-1])
+    norm = (colors.LogNorm if axis.scale == "log" else colors.Normalize)(axis.edges[0], axis.edges[-1])
     reach = 1.1
     for k, (_, branch) in enumerate(_branches(ds)):
         for angle in (name for name in ("multiplier_angle_1", "multiplier_angle_2") if name in branch):
@@ -379,10 +374,10 @@ def _scatter(ax: Axes, x: NDArray[Any], y: NDArray[Any], **style: Any) -> Any:
     return ax.scatter(x, y, linewidths=0, rasterized=True, **style)
 
 
-def _dot(marker: str, label: str, colour: Any = None) -> Line2D:
+def _dot(marker: str, label: str, colour: Any = None) -> lines.Line2D:
     """Entry of a legend for points."""
     colour = rcParams["text.color"] if colour is None else colour
-    return Line2D([], [], linestyle="", marker=marker, markersize=4, color=colour, label=label)
+    return lines.Line2D([], [], linestyle="", marker=marker, markersize=4, color=colour, label=label)
 
 
 def _directions(ds: xr.Dataset, markers: str = "") -> list[Artist]:
