@@ -85,7 +85,7 @@ def make_work(methods: int = 3, settings: int = 4, cells: int = 5) -> xr.Dataset
 def named_sweep(shape: tuple[int, ...] = (12, 9)) -> xr.Dataset:
     """A sweep with the long names of a true one, and what its file says of its runs."""
     ds = make_sweep(shape).assign_attrs(configuration=json.dumps({"scene": {"time": {"span": "10 s"}}}))
-    ds["drive_amplitude"].attrs["long_name"] = "amplitude of the ring's angular velocity"
+    ds["drive_amplitude"].attrs["long_name"] = "2/π of the ring's final angular velocity"
     ds["regime"] = ds["regime"].clip(max=3)
     return ds
 

@@ -667,7 +667,7 @@ Arctan = _drive(
     "Smooth run-up, the paper's h(t): :math:`s = t \\arctan t - \\tfrac12 \\ln(1 + t^2)`.",
     "amplitude*(t*atan(t) - log1p(t**2)/2)",
     rate="amplitude*atan(t)",
-    amplitude=Parameter("rad/s", "amplitude of the ring's angular velocity"),
+    amplitude=Parameter("rad/s", "2/π of the ring's final angular velocity"),
 )
 
 add_drive("power", Power)

@@ -275,7 +275,7 @@ _ON_A_LINE = {
     "rad": "m",
     "rad/s": "m/s",
     "angular velocity of the ring": "velocity of the belt",
-    "amplitude of the ring's angular velocity": "amplitude of the belt's velocity",
+    "2/π of the ring's final angular velocity": "2/π of the belt's final velocity",
     "angle of the ring after one second": "displacement of the belt after one second",
     drives.PER_SECOND_P["rad"]: drives.PER_SECOND_P["m"],
     "amplitude of the rocking angle": "amplitude of the displacement",
