@@ -7,13 +7,11 @@ replicate have to do with each other (A. B. Owen, Practical Quasi-Monte Carlo In
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv, ndtr, ndtri, stdtrit
+from scipy.special import betaincinv, stdtrit
 
 Floats = NDArray[np.float64]
 
@@ -27,82 +25,34 @@ METHODS = ("sobol", "latin-hypercube", "random")
 # Distributions
 
 
-def _normal(u: Floats, mean: float, deviation: float) -> Floats:
-    return mean + deviation * ndtri(u)
-
-
-def _uniform(u: Floats, low: float, high: float) -> Floats:
-    return low + (high - low) * u
-
-
-def _lognormal(u: Floats, mean: float, deviation: float) -> Floats:
-    variance = np.log1p((deviation / mean) ** 2)
-    return mean * np.exp(np.sqrt(variance) * ndtri(u) - 0.5 * variance)
-
-
-def _truncnormal(u: Floats, mean: float, deviation: float, low: float, high: float) -> Floats:
-    a, b = (low - mean) / deviation, (high - mean) / deviation
-    # In the upper tail the distribution function rounds to 1, in the lower one it has all its digits.
-    sign = -1.0 if a > 0.0 else 1.0
-    if a > 0.0:
-        a, b, u = -b, -a, 1.0 - u
-    z = ndtri(ndtr(a) + u * (ndtr(b) - ndtr(a)))
-    return np.clip(mean + sign * deviation * z, low, high)
-
-
-def _triangular(u: Floats, low: float, mode: float, high: float) -> Floats:
-    width, rise = high - low, mode - low
-    below = low + np.sqrt(u * width * rise)
-    return np.where(u * width < rise, below, high - np.sqrt((1.0 - u) * width * (high - mode)))
-
-
-@dataclass(frozen=True)
-class Distribution:
-    """A distribution of one number.
-
-    Attributes
-    ----------
-    arguments : tuple of str
-        What its numbers mean. A ``standard deviation`` is positive; all others are values of the number itself.
-    quantile : callable
-        Inverse of the distribution function, of shares and of these numbers.
-    problem : callable
-        What is wrong with the numbers; empty if nothing.
-    """
-
-    arguments: tuple[str, ...]
-    quantile: Callable[..., Floats]
-    problem: Callable[..., str] = lambda *_: ""
-
-
-def _bad_ends(low: float, high: float) -> str:
-    return "" if low < high else "the first end must be less than the last"
-
-
-def _bad_truncation(mean: float, deviation: float, low: float, high: float) -> str:
-    nearest = min(abs(low - mean), abs(high - mean)) / deviation
-    far = nearest > 30.0 and (low > mean or high < mean)
-    return _bad_ends(low, high) or ("both ends are more than 30 standard deviations away" if far else "")
-
-
-def _bad_triangle(low: float, mode: float, high: float) -> str:
-    return _bad_ends(low, high) or ("" if low <= mode <= high else "the mode must lie between the ends")
-
-
-#: Distributions by name.
-DISTRIBUTIONS: dict[str, Distribution] = {
-    "normal": Distribution(("mean", "standard deviation"), _normal),
-    "uniform": Distribution(("least value", "greatest value"), _uniform, _bad_ends),
-    "lognormal": Distribution(
-        ("mean", "standard deviation"),
-        _lognormal,
-        lambda mean, _: "" if mean > 0.0 else "the mean must be greater than 0",
-    ),
-    "truncnormal": Distribution(
-        ("mean", "standard deviation", "least value", "greatest value"), _truncnormal, _bad_truncation
-    ),
-    "triangular": Distribution(("least value", "mode", "greatest value"), _triangular, _bad_triangle),
+#: What the numbers of each distribution mean, by its name. Mean and deviation are those of the number itself.
+DISTRIBUTIONS = {
+    "normal": ("mean", "standard deviation"),
+    "uniform": ("least value", "greatest value"),
+    "lognormal": ("mean", "standard deviation"),
+    "truncnormal": ("mean", "standard deviation", "least value", "greatest value"),
+    "triangular": ("least value", "mode", "greatest value"),
 }
+
+
+def distribution(kind: str, *numbers: float) -> Any:
+    """A distribution of :data:`DISTRIBUTIONS` as SciPy has it."""
+    # It is slow to import, and only samples need it.
+    from scipy import stats
+
+    # Of NumPy, so that a division by zero is no exception.
+    first, second, *ends = map(np.float64, numbers)
+    match kind:
+        case "normal":
+            return stats.norm(first, second)
+        case "uniform":
+            return stats.uniform(first, second - first)
+        case "lognormal":
+            variance = np.log1p((second / first) ** 2)
+            return stats.lognorm(np.sqrt(variance), scale=first * np.exp(-0.5 * variance))
+        case "truncnormal":
+            return stats.truncnorm(*((np.array(ends) - first) / second), first, second)
+    return stats.triang((second - first) / (ends[0] - first), first, ends[0] - first)
 
 
 # Designs
@@ -262,18 +212,19 @@ def sobol_sums(rows: Floats) -> Floats:
 
     Parameters
     ----------
-    rows : ndarray of shape ``(count, parameters + 2)``
+    rows : ndarray of shape ``(..., count, parameters + 2)``
         Values of a function at the points of :func:`saltelli`.
 
     Returns
     -------
-    ndarray of shape ``(3 + 3 * parameters,)``
+    ndarray of shape ``(..., 3 + 3 * parameters)``
         The sums of f(A), f(B) and f(A)² + f(B)², then for each parameter those of f(AB), f(B) (f(AB) - f(A)) and
         (f(A) - f(AB))².
     """
-    a, b, mixed = rows[:, :1], rows[:, -1:], rows[:, 1:-1]
-    each = np.stack([mixed.sum(axis=0), (b * (mixed - a)).sum(axis=0), ((a - mixed) ** 2).sum(axis=0)], axis=-1)
-    return np.concatenate([[a.sum(), b.sum(), (a**2).sum() + (b**2).sum()], each.ravel()])
+    a, b, mixed = rows[..., :1], rows[..., -1:], rows[..., 1:-1]
+    own = np.concatenate([a, b, a**2 + b**2], axis=-1).sum(axis=-2)
+    each = np.stack([mixed, b * (mixed - a), (a - mixed) ** 2], axis=-1).sum(axis=-3)
+    return np.concatenate([own, each.reshape(*own.shape[:-1], -1)], axis=-1)
 
 
 def sobol_indices(sums: Floats, size: int) -> tuple[Floats, Floats]:

@@ -12,13 +12,14 @@ from scipy.special import ndtr, ndtri
 from xarray.testing import assert_identical
 
 import ringsweep
-from ringsweep import InputError, statistics
+from ringsweep import InputError
 from ringsweep.cli import main
 from ringsweep.config import load
 from ringsweep.plots import probability_panel, regime_map, sensitivity_panel, survival_panel
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.statistics import (
     clopper_pearson,
+    distribution,
     quantiles,
     saltelli,
     share_interval,
@@ -72,7 +73,7 @@ def test_a_distribution_has_its_mean_and_its_quantiles() -> None:
         "truncnormal": ((0.0, 1.0, 0.0, 40.0), np.sqrt(2.0 / np.pi), np.sqrt(1.0 - 2.0 / np.pi)),
     }
     for name, (numbers, mean, deviation) in cases.items():
-        values = statistics.DISTRIBUTIONS[name].quantile(u, *numbers)
+        values = distribution(name, *numbers).ppf(u)
         assert values.mean() == pytest.approx(mean, rel=1e-4), name
         assert values.std() == pytest.approx(deviation, rel=1e-3), name
         assert (np.diff(values) >= 0.0).all()
@@ -80,8 +81,8 @@ def test_a_distribution_has_its_mean_and_its_quantiles() -> None:
 
 def test_a_truncated_normal_keeps_its_digits_in_both_tails() -> None:
     u = np.array([0.1, 0.9])
-    above = statistics.DISTRIBUTIONS["truncnormal"].quantile(u, 0.0, 1.0, 12.0, 13.0)
-    below = statistics.DISTRIBUTIONS["truncnormal"].quantile(1.0 - u, 0.0, 1.0, -13.0, -12.0)
+    above = distribution("truncnormal", 0.0, 1.0, 12.0, 13.0).ppf(u)
+    below = distribution("truncnormal", 0.0, 1.0, -13.0, -12.0).ppf(1.0 - u)
     # Far out a normal tail is an exponential of rate 12.
     assert above == pytest.approx(12.0 - np.log1p(-u) / 12.0, abs=5e-3)
     assert above == pytest.approx(-below, rel=1e-12)
@@ -324,11 +325,11 @@ def test_a_ratio_to_an_axis_keeps_its_ratio() -> None:
 
 
 def test_a_sampled_sweep_that_is_stopped_goes_on_bit_for_bit(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from ringsweep.runs import sampled
+    from ringsweep.runs import probabilities
 
     given = config(grid={"belt.velocity": [0.05, 0.1, 0.2]}, sensitivity=True, survival=[3.0, 5.0])
     whole = run(given, tmp_path / "whole.nc")
-    compute, done = sampled.compute_parts, []
+    compute, done = probabilities.compute_parts, []
 
     def fail_later(*args: Any) -> Any:
         done.append(1)
@@ -336,12 +337,12 @@ def test_a_sampled_sweep_that_is_stopped_goes_on_bit_for_bit(tmp_path: Any, monk
             raise RuntimeError("stop")
         return compute(*args)
 
-    monkeypatch.setattr(sampled, "compute_parts", fail_later)
+    monkeypatch.setattr(probabilities, "compute_parts", fail_later)
     monkeypatch.setattr("ringsweep.runs.task_sizes.TaskSizes.max_cells", 1)
     with pytest.raises(RuntimeError):
         run(given, tmp_path / "part.nc")
     assert list((tmp_path / "part.nc.partial").glob("*.npz"))
-    monkeypatch.setattr(sampled, "compute_parts", compute)
+    monkeypatch.setattr(probabilities, "compute_parts", compute)
     part = run(given, tmp_path / "part.nc", jobs=2)
     for name in whole.data_vars:
         assert_identical(part[name], whole[name])
@@ -456,7 +457,7 @@ def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatc
 
 
 def test_the_boundary_at_the_medians_is_that_of_the_closed_form(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from ringsweep.runs.sampled import nominal
+    from ringsweep.runs.probabilities import nominal
     from ringsweep.runs.sweep import Execution, compute
 
     ds = run(config(grid={"time.span": [6.0, 7.0, 8.0]}, n=64))

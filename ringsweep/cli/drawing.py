@@ -72,7 +72,7 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
 
         from ringsweep.runs.boundaries import boundary, run_at
         from ringsweep.runs.executors import Execution
-        from ringsweep.runs.sampled import nominal
+        from ringsweep.runs.probabilities import nominal
         from ringsweep.runs.sweep import compute
 
         tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance

@@ -30,7 +30,7 @@ OWN_FILES = [Path(name) for name in os.environ.get("RINGSWEEP_LAWS", "").split(o
 # the cached kernels and the results valid.
 _ROOMS = ("compile", "numerics", "physics", "models", "solvers")
 IN_KERNELS = (*_ROOMS, "quantities/flags.py", "quantities/parameters.py")
-IN_RESULTS = (*_ROOMS, "quantities", "runs/cells.py", "statistics.py", "config/sampling.py", "runs/sampled.py")
+IN_RESULTS = (*_ROOMS, "quantities", "runs/cells.py", "statistics.py", "config/uncertain.py", "runs/probabilities.py")
 
 
 def sources_digest(root: Path, own_files: Iterable[Path] = (), places: Iterable[str] = IN_RESULTS) -> str:

@@ -28,10 +28,10 @@ from ringsweep.config.axes import (
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.follow import Follow, put_state, read_follow, run_to_continue, with_direction
 from ringsweep.config.refine import Refinement, read_refinement
-from ringsweep.config.sampling import Sample, read_sample
 from ringsweep.config.scene import parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import read_values, suggestion, warn_once
 from ringsweep.config.solver import read_solver
+from ringsweep.config.uncertain import Sample, read_sample
 from ringsweep.config.yaml_text import Document, scalar
 from ringsweep.errors import InputError
 from ringsweep.models.scene import LAW, Scene

@@ -14,8 +14,8 @@ from ringsweep.config.follow import DIRECTIONS
 from ringsweep.config.own import FORMULA, TABLE_LAW
 from ringsweep.config.record import INSTANTS, KEEP, PERIOD
 from ringsweep.config.refine import NUMBERS
-from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.config.tables import INTERPOLATIONS, TABLES
+from ringsweep.config.uncertain import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
@@ -233,9 +233,8 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
 
 def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
     kinds: dict[str, Any] = {}
-    for name, distribution in DISTRIBUTIONS.items():
-        count = len(distribution.arguments)
-        about = f"[{', '.join(distribution.arguments)}]"
+    for name, arguments in DISTRIBUTIONS.items():
+        count, about = len(arguments), f"[{', '.join(arguments)}]"
         kinds[name] = {"description": about, "type": "array", "items": _VALUE, "minItems": count, "maxItems": count}
     columns = {"type": "object", "additionalProperties": _list(_VALUE)}
     kinds["values"] = {

@@ -18,7 +18,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.flags import FAILED
 from ringsweep.quantities.variables import OUTCOMES
-from ringsweep.runs import sampled
+from ringsweep.runs import probabilities
 from ringsweep.runs.cells import compute_task
 from ringsweep.runs.reuse import EarlierSweep
 from ringsweep.solvers.certificate import with_errors
@@ -44,7 +44,7 @@ _FEW, _MOST, _MEASURING = 1000, 100_000, 0.5
 def bytes_of_cell(config: Config) -> int:
     """Size of the columns of a cell, or of its sums; variables that some solvers leave out are counted."""
     if config.sample is not None:
-        return sampled.bytes_of_part(config) * config.sample.replicates
+        return probabilities.bytes_of_part(config) * config.sample.replicates
     model = model_of(config.scene.structure)
     columns = model.columns(config.scene.structure)
     names = [*(name for name in columns if name not in model.absent), "steps", "certified", "uncertified_because"]
@@ -148,7 +148,7 @@ def _seconds_of_run(config: Config) -> float:
     solver, sample = config.solver, config.sample
     limits = {field.name for field in fields(solver)} & {"steps", "max_steps"}
     few = replace(solver, **{name: min(getattr(solver, name), _FEW) for name in limits})
-    axes = config.axes if sample is None else sample.axes(config.scene, config.axes, sample.shares(0))
+    axes = config.axes if sample is None else sample.axes(config.scene, config.axes, sample.shares[0])
     # A cell that starts from another one costs about as much.
     one = replace(config, axes=axes, sample=None, follow=None, solver=few)
     layout = Layout(tuple(axes.sizes.values()))

@@ -24,7 +24,7 @@ from ringsweep.config.yaml_text import read
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, OUTCOMES, Variable, error_attribute
-from ringsweep.runs import sampled
+from ringsweep.runs import probabilities
 from ringsweep.runs.cells import TaskResult, compute_task, coordinates, kernels_of
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
 from ringsweep.runs.needs import check_room
@@ -251,7 +251,7 @@ def compute(
     found = _Work(config, layout, store, earlier, execution).compute()
     columns = {name: column.reshape((*layout.sizes, *column.shape[1:])) for name, column in store.columns.items()}
     if config.sample is not None:
-        columns = sampled.statistics(config, columns)
+        columns = probabilities.statistics(config, columns)
     elif found is not None and config.refine is not None:
         complete(config.refine, found, tuple(slice(None) for _ in layout.sizes), columns)
         columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
@@ -273,14 +273,14 @@ def compute(
 def _layout(config: Config, whole: bool = False) -> Layout:
     """Order of the cells of a sweep, or of the parts of the cells of a sampled one; in one chunk for a `whole` one."""
     if config.sample is not None:
-        return sampled.part_layout(config, sampled.grid_layout(config, whole))
+        return probabilities.part_layout(config, probabilities.grid_layout(config, whole))
     sizes, section = tuple(config.axes.sizes.values()), config.scene.structure.section
     return Layout(sizes, sizes if whole else None, 1 if section is None else section.keep)
 
 
 def _variables(config: Config) -> Mapping[str, Variable]:
     """Declarations of the variables of a sweep."""
-    return model_of(config.scene.structure).variables if config.sample is None else sampled.variables(config)
+    return model_of(config.scene.structure).variables if config.sample is None else probabilities.variables(config)
 
 
 def _warn(results: xr.Dataset, config: Config) -> None:
@@ -359,8 +359,8 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
     destination = target, checkpoint.working_folder, frame, _variables(config)
     if config.sample is not None:
-        chunks = ((region[:-1], sampled.statistics(config, sums)) for region, sums in checkpoint.chunks())
-        netcdf.write(*destination, sampled.grid_layout(config), chunks)
+        chunks = ((region[:-1], probabilities.statistics(config, sums)) for region, sums in checkpoint.chunks())
+        netcdf.write(*destination, probabilities.grid_layout(config), chunks)
     elif found is None or config.refine is None:
         netcdf.write(*destination, layout, checkpoint.chunks())
     else:
@@ -526,7 +526,7 @@ class _Work:
                 sent = replace(config, source={})
                 task: Callable[..., TaskResult] = partial(compute_task, sent, self.layout)
                 if config.sample is not None:
-                    task = partial(sampled.compute_parts, sent, self.layout)
+                    task = partial(probabilities.compute_parts, sent, self.layout)
                 tasks = _Tasks(task, store, workers, sizes, stopped, bar)
                 try:
                     yield tasks
@@ -611,8 +611,8 @@ def _coordinates_and_attributes(config: Config, found: Refined | None) -> tuple[
     """Coordinates and attributes of the dataset of a sweep."""
     coords, attrs = coordinates(config.scene, config.axes.columns), attributes(config)
     if config.sample is not None:
-        coords |= sampled.coordinates(config)
-        attrs |= sampled.attributes(config)
+        coords |= probabilities.coordinates(config)
+        attrs |= probabilities.attributes(config)
     if config.refine is not None and found is not None:
         attrs |= refinement_attributes(config.refine, found)
     if config.follow is not None and DIRECTION in config.axes.sizes:

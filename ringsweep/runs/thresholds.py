@@ -195,7 +195,7 @@ def distribution(
         if factor.over == path:
             raise InputError("path", f"{factor.paths[0]} is drawn over {path}: give it a distribution of its own")
     size = sample.size
-    shares = np.concatenate([sample.shares(k) for k in range(sample.replicates)])
+    shares = sample.shares
     drawn = {name: column for name, (_, column) in sample.axes(config.scene, Axes(), shares).columns.items()}
 
     def runs(points: NDArray[np.intp], at: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -7,7 +7,6 @@ size does not depend on the number of runs, and the numbers whose quantiles are 
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -17,11 +16,11 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config, Setting, load, sweepable
 from ringsweep.config.axes import dimension
-from ringsweep.config.sampling import CENSORED, Sample, censored
+from ringsweep.config.uncertain import CENSORED, Sample, censored
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.flags import REGIMES
-from ringsweep.quantities.variables import QUANTILE_ENDS, SAMPLED, Variable
+from ringsweep.quantities.variables import OUTCOMES, QUANTILE_ENDS, SAMPLED, Variable
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.statistics import CONFIDENCE, quantiles, share_interval, sobol_indices, sobol_sums
 from ringsweep.storage.chunks import CHUNK, Layout, chunk_shape
@@ -51,8 +50,10 @@ def part_layout(config: Config, grid: Layout) -> Layout:
 def bytes_of_part(config: Config) -> int:
     """Size of the sums of a part, and of its runs if they are kept."""
     sample = _sample(config)
-    sums = sum(math.prod(shape) * np.dtype(dtype).itemsize for dtype, shape in _sums_of(sample).values())
-    return sums + sample.keep * sample.size * sample.rows * _RUN_BYTES
+    events, own = len(REGIMES) + len(sample.survival), sample.size * len(sample.own)
+    indices = len(REGIMES) + len(sample.sensitive) * max(len(sample.survival), 1)
+    numbers = 2 * events + own * len(sample.quantiles) + 3 * (len(sample.factors) + 1) * indices * sample.sensitivity
+    return 8 * numbers + sample.keep * sample.size * sample.rows * _RUN_BYTES
 
 
 def _sample(config: Config) -> Sample:
@@ -60,90 +61,55 @@ def _sample(config: Config) -> Sample:
     return config.sample
 
 
-def _sums_of(sample: Sample) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Type and shape of the sums of a part, by name."""
-    found: dict[str, tuple[str, tuple[int, ...]]] = {"runs": ("int32", (len(REGIMES), 2))}
-    if sample.survival:
-        found["lost"] = "int32", (len(sample.survival), 2)
-    for name in sample.quantiles:
-        found[f"{name}_values"] = "float64", (sample.size * len(sample.own),)
-    if sample.sensitivity:
-        each = 3 * (len(sample.factors) + 1)
-        found["sobol_sums"] = "float64", (len(REGIMES), each)
-        for name in sample.sensitive:
-            found[f"{name}_sobol_sums"] = "float64", (*([len(sample.survival)] if name in CENSORED else []), each)
-    return found
-
-
 def compute_parts(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
     """Run the parts at some positions of the layout of parts, and reduce each to its sums."""
     sample = _sample(config)
-    cells, replicates = np.divmod(positions, sample.replicates)
-    sums = {name: np.zeros((len(positions), *shape), dtype=dtype) for name, (dtype, shape) in _sums_of(sample).items()}
-    seconds: float | None = 0.0
-    grid = Layout(layout.sizes[:-1], layout.chunk[:-1])
-    for replicate in np.unique(replicates).tolist():
-        shares = sample.shares(replicate)
-        runs = len(shares)
-        axes = sample.axes(config.scene, config.axes, shares)
-        one = replace(config, axes=axes, sample=None)
-        # A cell and its runs stand together, so a run has the position of its cell times their number.
-        of_runs = Layout((*grid.sizes, runs), (*grid.chunk, runs))
-        own = np.flatnonzero(replicates == replicate)
-        together = max(CHUNK // runs, 1)
-        for some in (own[start : start + together] for start in range(0, len(own), together)):
-            numbers = (cells[some, None] * runs + np.arange(runs)).ravel()
-            found: list[TaskResult] = []
-            for start in range(0, len(numbers), CHUNK):
-                result = compute_task(one, of_runs, numbers[start : start + CHUNK])
-                seconds = None if result.seconds is None or seconds is None else seconds + result.seconds
-                needed = list(result.columns) if sample.keep else _needed(config)
-                found.append(replace(result, columns={name: result.columns[name] for name in needed}))
-            columns = {
-                name: np.concatenate([result.columns[name] for result in found]).reshape(len(some), runs)
-                for name in needed
-            }
-            if sample.keep:
-                for name, column in columns.items():
-                    sums.setdefault(name, np.empty((len(positions), runs), dtype=column.dtype))[some] = column
-            for k, part in enumerate(some.tolist()):
-                of_run = {name: column[k] for name, column in columns.items()}
-                of_part = _reduce(sample, censored(config.scene), of_run)
-                for name, value in of_part.items():
-                    sums[name][part] = value
-    return TaskResult(positions, sums, seconds, environment(), processor())
-
-
-def _needed(config: Config) -> list[str]:
-    """Outcomes that are reduced."""
-    sample = _sample(config)
+    runs, each = sample.size * sample.rows, sample.n * sample.rows
+    one = replace(config, axes=sample.axes(config.scene, config.axes, sample.shares), sample=None)
+    # A cell and its runs stand together, so a run has the position of its part times their number.
+    of_runs = Layout((*layout.sizes[:-1], each), (*layout.chunk[:-1], each))
+    numbers = (positions[:, None] * runs + np.arange(runs)).ravel()
     times = [censored(config.scene)] if sample.survival else []
-    return list(dict.fromkeys(["regime", "certified", *times, *sample.quantiles, *sample.sensitive]))
+    needed = list(dict.fromkeys(["regime", "certified", *times, *sample.quantiles, *sample.sensitive]))
+    found, seconds = [], []
+    for start in range(0, len(numbers), CHUNK):
+        result = compute_task(one, of_runs, numbers[start : start + CHUNK])
+        found.append({name: result.columns[name] for name in (result.columns if sample.keep else needed)})
+        seconds.append(result.seconds)
+    columns = {name: np.concatenate([part[name] for part in found]).reshape(len(positions), runs) for name in found[0]}
+    sums = _reduce(sample, censored(config.scene), columns) | (columns if sample.keep else {})
+    total = None if None in seconds else sum(filter(None, seconds))
+    return TaskResult(positions, sums, total, environment(), processor())
 
 
 def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
-    """The sums of one part, from the outcomes of its runs; `time` is the variable of survival."""
+    """The sums of some parts, from the outcomes of their runs; `time` is the variable of survival."""
     # A row for each point.
-    rows = {name: column.reshape(-1, sample.rows) for name, column in columns.items()}
-    points = {name: column[:, sample.own].ravel() for name, column in rows.items()}
+    rows = {name: column.reshape(len(column), -1, sample.rows) for name, column in columns.items()}
+    points = {name: column[..., sample.own].reshape(len(column), -1) for name, column in rows.items()}
     sure = points["certified"] == 1
-    found: Columns = {"runs": np.zeros((len(REGIMES), 2), dtype=np.int32)}
-    np.add.at(found["runs"], (points["regime"], sure.astype(int)), 1)
+
+    def counted(events: NDArray[np.bool_]) -> NDArray[np.int32]:
+        """Points without and with certificate at which something happens."""
+        both = [(events & one[..., None]).sum(axis=1) for one in (~sure, sure)]
+        return np.stack(both, axis=-1).astype(np.int32)
+
+    words = np.arange(len(REGIMES))
+    found: Columns = {"runs": counted(points["regime"][..., None] == words)}
     if sample.survival:
-        lost = points[time][:, None] <= np.array(sample.survival)
-        found["lost"] = np.stack([lost[~sure].sum(axis=0), lost[sure].sum(axis=0)], axis=-1)
+        found["lost"] = counted(points[time][..., None] <= np.array(sample.survival))
     for name in sample.quantiles:
         # What did not happen within the span happens later, if ever; without a certificate nothing is known.
         happened = np.where(np.isnan(points[name]), np.inf, points[name])
         found[f"{name}_values"] = np.where(sure, happened, np.nan)
     if sample.sensitivity:
-        each = [sobol_sums((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))]
-        found["sobol_sums"] = np.stack(each)
+        found["sobol_sums"] = sobol_sums(1.0 * (rows["regime"][:, None] == words[:, None, None]))
         for name in sample.sensitive:
-            # A time that has not come is not a number, and compares as later.
-            functions = [rows[name] <= t for t in sample.survival] if name in CENSORED else [rows[name]]
-            each = [sobol_sums(function.astype(float)) for function in functions]
-            found[f"{name}_sobol_sums"] = np.stack(each) if name in CENSORED else each[0]
+            values = rows[name]
+            if name in CENSORED:
+                # A time that has not come is not a number, and compares as later.
+                values = 1.0 * (values[:, None] <= np.array(sample.survival)[:, None, None])
+            found[f"{name}_sobol_sums"] = sobol_sums(values)
     return found
 
 
@@ -157,37 +123,33 @@ def statistics(config: Config, sums: Columns) -> Columns:
         As tasks return them; the first dimensions are those of the grid.
     """
     sample = _sample(config)
-    shape = sums["runs"].shape[:-3]
-    flat = {name: column.reshape(-1, *column.shape[len(shape) :]) for name, column in sums.items()}
+    of_parts = sums["runs"].ndim - 3
     size = sample.size * len(sample.own)
     total = float(size * sample.replicates)
-    found: Columns = {"runs": flat["runs"]}
+    found: Columns = {"runs": sums["runs"]}
     # Replicates last, certified runs and all runs of a word.
-    counts = np.moveaxis(flat["runs"], 1, -1)
-    sure, reported = counts[:, :, 1], counts.sum(axis=2)
-    unsure = counts[:, :, 0].sum(axis=1)
+    counts = np.moveaxis(sums["runs"], of_parts, -1)
+    sure, reported = counts[..., 1, :], counts.sum(axis=-2)
+    unsure = counts[..., 0, :].sum(axis=-2, keepdims=True)
     found["probability"] = reported.sum(axis=-1) / total
-    low, high = _both_ways(found, "probability", sure, unsure[:, None], size, sample)
+    low, high = _both_ways(found, "probability", sure, unsure, size, sample)
     without = np.subtract(*share_interval(reported, size, sample.independent)[::-1])
     found["probability_numerics"] = np.maximum(high - low - without, 0.0)
     if sample.survival:
-        lost = np.moveaxis(flat["lost"], 1, -1)
-        held, certain = size - lost.sum(axis=2), size - unsure[:, None] - lost[:, :, 1]
+        lost = np.moveaxis(sums["lost"], of_parts, -1)
+        held = size - lost.sum(axis=-2)
         found["survival"] = held.sum(axis=-1) / total
-        _both_ways(found, "survival", certain, unsure[:, None], size, sample)
-    for name, levels in sample.quantiles.items():
-        rows = [quantiles(values, levels, sample.independent) for values in flat[f"{name}_values"]]
-        place = np.searchsorted(_levels(sample), levels)
-        for k, end in enumerate(("", "_low", "_high")):
-            column = found[f"{name}_quantile{end}"] = np.full((len(rows), len(_levels(sample))), np.nan)
-            column[:, place] = [row[k] for row in rows]
-    if sample.sensitivity:
-        for prefix in ("", *(f"{name}_" for name in sample.sensitive)):
-            together = np.moveaxis(flat[f"{prefix}sobol_sums"], 1, -2)
-            for name, index in zip(("sobol_first", "sobol_total"), sobol_indices(together, sample.size), strict=True):
-                found |= {f"{prefix}{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
-    found |= {name: column for name, column in flat.items() if name not in _sums_of(sample)}
-    return {name: column.reshape((*shape, *column.shape[1:])) for name, column in found.items()}
+        _both_ways(found, "survival", size - unsure - lost[..., 1, :], unsure, size, sample)
+    for name in sample.quantiles:
+        values, levels = sums[f"{name}_values"], _levels(sample)
+        each = [quantiles(values[cell], levels, sample.independent) for cell in np.ndindex(values.shape[:-2])]
+        columns = np.reshape(each, (*values.shape[:-2], 3, len(levels)))
+        found |= {f"{name}_quantile{end}": columns[..., k, :] for k, end in enumerate(QUANTILE_ENDS)}
+    for prefix in ("", *(f"{name}_" for name in sample.sensitive)) if sample.sensitivity else ():
+        together = np.moveaxis(sums[f"{prefix}sobol_sums"], of_parts, -2)
+        for name, index in zip(("sobol_first", "sobol_total"), sobol_indices(together, sample.size), strict=True):
+            found |= {f"{prefix}{name}{end}": part for end, part in zip(QUANTILE_ENDS, index, strict=True)}
+    return found | {name: column for name, column in sums.items() if name in OUTCOMES}
 
 
 def _both_ways(
@@ -219,12 +181,11 @@ def coordinates(config: Config) -> dict[str, Any]:
         names = [factor.name for factor in sample.factors]
         found["parameter"] = "parameter", names, {"long_name": "uncertain parameter"}
     if sample.keep:
-        each = [sample.axes(config.scene, config.axes, sample.shares(r)).columns for r in range(sample.replicates)]
-        known = sweepable(config.scene)
+        columns, known = sample.axes(config.scene, config.axes, sample.shares).columns, sweepable(config.scene)
         for path in (path for factor in sample.factors for path in factor.paths):
-            dims = each[0][path][0]
-            column = np.stack([columns[path][1] for columns in each], axis=-2)
-            found[dimension(path)] = (*dims[:-1], "replicate", "sample"), column, known[path].attributes
+            (*dims, _), column = columns[path]
+            column = column.reshape(*column.shape[:-1], sample.replicates, -1)
+            found[dimension(path)] = (*dims, "replicate", "sample"), column, known[path].attributes
     return found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
 
@@ -22,7 +22,7 @@ from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import quantity, show
-from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, unit_points
+from ringsweep.statistics import DISTRIBUTIONS, METHODS, distribution, saltelli, unit_points
 
 #: Keys of ``sweep.sample`` with a number.
 NUMBERS = {
@@ -84,7 +84,7 @@ class Factor:
         if self.table:
             row = (u * len(self.table[0])).astype(int)
             return {path: np.array(column)[row] for path, column in zip(self.paths, self.table, strict=True)}
-        return {self.paths[0]: DISTRIBUTIONS[self.kind].quantile(u, *self.numbers)}
+        return {self.paths[0]: distribution(self.kind, *self.numbers).ppf(u)}
 
 
 @dataclass(frozen=True)
@@ -144,9 +144,10 @@ class Sample:
         """Whether all points are independent of each other."""
         return self.method == "random"
 
-    def shares(self, replicate: int) -> NDArray[np.float64]:
-        """Shares of the runs of a replicate, shape ``(size * rows, factors)``; the runs of one point stand together."""
-        return _shares(self.method, self.size, len(self.factors), self.seed, replicate, self.sensitivity)
+    @property
+    def shares(self) -> NDArray[np.float64]:
+        """Shares of all runs, shape ``(n * rows, factors)``; those of a replicate, and of one point, stand together."""
+        return _shares(self.method, self.size, len(self.factors), self.seed, self.replicates, self.sensitivity)
 
     def axes(self, scene: Scene, axes: Axes, shares: NDArray[np.float64]) -> Axes:
         """The axes of a grid with one more dimension, ``sample``, along which the uncertain parameters vary."""
@@ -174,10 +175,10 @@ class Sample:
 
 
 @lru_cache(maxsize=8)
-def _shares(method: str, size: int, factors: int, seed: int, replicate: int, sensitivity: bool) -> NDArray[np.float64]:
-    if not sensitivity:
-        return unit_points(method, size, factors, seed, replicate)
-    return saltelli(unit_points(method, size, 2 * factors, seed, replicate)).reshape(-1, factors)
+def _shares(method: str, size: int, factors: int, seed: int, replicates: int, sensitivity: bool) -> NDArray[np.float64]:
+    drawn = factors * (2 if sensitivity else 1)
+    points = np.concatenate([unit_points(method, size, drawn, seed, replicate) for replicate in range(replicates)])
+    return saltelli(points).reshape(-1, factors) if sensitivity else points
 
 
 def censored(scene: Scene) -> str:
@@ -195,20 +196,19 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     """
     if given is None:
         return None
+    where = "sweep.sample"
     if not isinstance(given, dict):
-        raise InputError("sweep.sample", f"a section with keys is expected, got {show(given)}")
-    check_keys(given, KEYS, "sweep.sample")
-    for key in ("n", "of"):
+        raise InputError(where, f"a section with keys is expected, got {show(given)}")
+    check_keys(given, KEYS, where)
+    for key, example in (("n", "n: 1024"), ("of", "of: {body.mass: {normal: [76 g, 1 %]}}")):
         if key not in given:
-            example = "n: 1024" if key == "n" else "of: {body.mass: {normal: [76 g, 1 %]}}"
-            raise InputError(f"sweep.sample.{key}", f"missing (for example `{example}`)")
+            raise InputError(f"{where}.{key}", f"missing (for example `{example}`)")
     numbers = {
-        key: int(quantity(given.get(key, parameter.default), parameter, f"sweep.sample.{key}"))
+        key: int(quantity(given.get(key, parameter.default), parameter, f"{where}.{key}"))
         for key, parameter in NUMBERS.items()
     }
-    method = one_of(given.get("method", METHODS[0]), METHODS, "sweep.sample.method", "is not a method")
+    method = one_of(given.get("method", METHODS[0]), METHODS, f"{where}.method", "is not a method")
     _check_number(method, numbers["n"], numbers["replicates"])
-    keep = boolean(given.get("keep", False), "sweep.sample.keep")
     sensitivity, sensitive = _sensitivity(given.get("sensitivity", False), scene, bool(given.get("survival")))
     found = Sample(
         _factors(given["of"], scene, axes),
@@ -218,35 +218,32 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
         **numbers,
         sensitivity=sensitivity,
         sensitive=sensitive,
-        keep=keep,
+        keep=boolean(given.get("keep", False), f"{where}.keep"),
     )
     cells = math.prod(axes.sizes.values())
-    if cells * found.replicates > MAX_CELLS:
-        raise InputError("sweep", f"{cells} cells x {found.replicates} replicates: at most {MAX_CELLS:.3g} fit")
-    if found.keep and cells * found.n * found.rows > MAX_CELLS:
-        raise InputError("sweep.sample.keep", f"{cells * found.n * found.rows:.3g} runs: at most {MAX_CELLS:.3g} fit")
+    for path, total in (("", cells * found.replicates), (".keep", cells * found.n * found.rows * found.keep)):
+        if total > MAX_CELLS:
+            raise InputError(where + path, f"{total:.3g} parts or runs: at most {MAX_CELLS:.3g} fit")
     _check_points(found, scene, axes)
     return found
 
 
 def _check_number(method: str, n: int, replicates: int) -> None:
     size, rest = divmod(n, replicates)
-    where = "sweep.sample.n"
-    if method == "sobol" and (rest or size < 1 or size & (size - 1)):
-        fitting = replicates * 2 ** max(round(math.log2(max(n / replicates, 1.0))), 0)
-        raise InputError(
-            where, f"{n} is not {replicates} replicates of a power of two, as Sobol points are: give {fitting}"
-        )
-    if rest or size < 1:
-        fitting = replicates * max(round(n / replicates), 1)
-        raise InputError(where, f"{n} samples do not divide into {replicates} replicates: give {fitting}")
+    sobol = method == "sobol"
+    if rest or size < 1 or (sobol and size & (size - 1)):
+        near = max(n / replicates, 1.0)
+        fitting = replicates * (2 ** round(math.log2(near)) if sobol else round(near))
+        parts = "of a power of two, as Sobol points are" if sobol else "of one length"
+        raise InputError("sweep.sample.n", f"{n} is not {replicates} replicates {parts}: give {fitting}")
 
 
 def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
+    """Factors, each after the one that it is multiplied by."""
     if not isinstance(given, dict) or not given:
         raise InputError("sweep.sample.of", f"a section of paths and distributions is expected, got {show(given)}")
     known = sweepable(scene)
-    found: dict[str, Factor] = {}
+    left: dict[str, Factor] = {}
     for key, spec in given.items():
         where = f"sweep.sample.of.{key}"
         parameters = {path: swept_parameter(known, path, where) for path in paths_of(key)}
@@ -255,39 +252,50 @@ def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
                 raise InputError(where, f"a {parameter.long_name} has no distribution: make it an axis of sweep.grid")
             if path in axes.columns:
                 raise InputError(where, "also an axis of the sweep: a path can vary in one place only")
-            if any(path in other.paths for other in found.values()):
+            if any(path in other.paths for other in left.values()):
                 raise InputError(where, f"{path} is drawn twice")
             if dimension(path) in ("sample", "replicate", "word", "parameter"):
                 raise InputError(where, "the path has the name of a dimension of the result")
-        found[where] = _factor(spec, parameters, where, known)
-    return _ordered(found, scene, axes)
+        left[where] = _factor(spec, parameters, where, known)
+    found: list[Factor] = []
+    while left:
+        drawn = {path for factor in left.values() for path in factor.paths}
+        ready = {where: factor for where, factor in left.items() if factor.over not in drawn}
+        if not ready:
+            where, factor = next(iter(left.items()))
+            raise InputError(f"{where}.over", f"{factor.over} is itself drawn over {factor.paths[0]}")
+        found += ready.values()
+        left = {where: factor for where, factor in left.items() if where not in ready}
+    valued = {*scene.values, *axes.columns, *(path for factor in found for path in factor.paths)}
+    for factor in found:
+        if factor.over is not None and factor.over not in valued:
+            raise InputError(
+                f"sweep.sample.of.{factor.name}.over", f"{factor.over} has no value in the scene, and no distribution"
+            )
+    return tuple(found)
 
 
 def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping[str, Parameter | Choice]) -> Factor:
     kinds = (*DISTRIBUTIONS, "values", "file")
     if not isinstance(spec, dict):
-        raise InputError(
-            where,
-            f"a distribution is expected, such as `{{normal: [0.3, 10 %]}}`, got {show(spec)} ({', '.join(kinds)})",
-        )
+        example = f"such as `{{normal: [0.3, 10 %]}}`, got {show(spec)} ({', '.join(kinds)})"
+        raise InputError(where, f"a distribution is expected, {example}")
     for key in spec:
         if key not in (*kinds, "over"):
             raise InputError(f"{where}.{key}", "is no distribution" + suggestion(key, kinds))
     named = [key for key in spec if key != "over"]
     if len(named) != 1:
         raise InputError(where, f"one distribution is expected, got {' and '.join(named) or 'none'}")
-    (kind,) = named
-    paths, over = tuple(parameters), None
+    (kind,), paths, over = named, tuple(parameters), None
+    if len(paths) > 1 and (kind != "values" or "over" in spec):
+        raise InputError(where, "paths that are drawn together need rows, and have no ratio: {file: samples.csv}")
+    parameter = parameters[paths[0]]
     if "over" in spec:
-        if len(paths) > 1:
-            raise InputError(f"{where}.over", "several paths that are drawn together have no common ratio")
-        over = _reference(spec["over"], paths[0], parameters[paths[0]], known, f"{where}.over")
-        parameters = {paths[0]: Parameter("1", f"ratio of {paths[0]} to {over}")}
+        over = _reference(spec["over"], paths[0], parameter, known, f"{where}.over")
+        parameter = Parameter("1", f"ratio of {paths[0]} to {over}")
+        parameters = {paths[0]: parameter}
     if kind == "values":
         return Factor(paths, kind, (), _table(spec["values"], parameters, f"{where}.values"), over)
-    if len(paths) > 1:
-        raise InputError(where, "paths that are drawn together need rows: {file: samples.csv}")
-    parameter = parameters[paths[0]]
     if parameter.whole:
         raise InputError(where, f"{parameter.long_name} must be a whole number: list them as {{values: [...]}}")
     return Factor(paths, kind, _numbers(spec[kind], kind, parameter, f"{where}.{kind}"), (), over)
@@ -301,19 +309,16 @@ def _reference(given: Any, path: str, parameter: Any, known: Mapping[str, Parame
         raise InputError(where, f"{show(given)} is no number of the scene" + suggestion(beside, known))
     if full == path:
         raise InputError(where, f"{full} is the path itself")
-    other = known[full]
-    if isinstance(other, Choice) or other.unit != parameter.unit:
+    if getattr(known[full], "unit", None) != parameter.unit:
         raise InputError(where, f"{full} is no number in the unit of {path}: their ratio has no meaning")
     return full
 
 
 def _table(given: Any, parameters: Mapping[str, Any], where: str) -> tuple[tuple[float, ...], ...]:
-    if not isinstance(given, dict):
-        if len(parameters) > 1:
-            raise InputError(where, f"a list for each of {', '.join(parameters)} is expected, got {show(given)}")
-        given = {next(iter(parameters)): given}
-    if set(given) != set(parameters):
-        raise InputError(where, f"lists for {', '.join(parameters)} are expected, got {', '.join(map(str, given))}")
+    if not isinstance(given, dict) and len(parameters) == 1:
+        given = dict.fromkeys(parameters, given)
+    if not isinstance(given, dict) or set(given) != set(parameters):
+        raise InputError(where, f"a list for each of {', '.join(parameters)} is expected, got {show(given)}")
     columns = {path: read_values(given[path], parameters[path], f"{where}.{path}") for path in parameters}
     lengths = {path: len(column) for path, column in columns.items()}
     if len(set(lengths.values())) > 1:
@@ -323,51 +328,30 @@ def _table(given: Any, parameters: Mapping[str, Any], where: str) -> tuple[tuple
 
 def _numbers(given: Any, kind: str, parameter: Parameter, where: str) -> tuple[float, ...]:
     """The numbers of a distribution. A standard deviation in per cent is a share of the mean."""
-    distribution = DISTRIBUTIONS[kind]
-    wanted = ", ".join(distribution.arguments)
-    if not isinstance(given, list) or len(given) != len(distribution.arguments):
+    arguments = DISTRIBUTIONS[kind]
+    wanted = ", ".join(arguments)
+    if not isinstance(given, list) or len(given) != len(arguments):
         raise InputError(where, f"[{wanted}] is expected, got {show(given)}")
-    place = replace(parameter, lower=-math.inf, upper=math.inf, open_lower=False, open_upper=False)
     found: list[float] = []
-    for k, (what, value) in enumerate(zip(distribution.arguments, given, strict=True)):
-        at = f"{where}.{k}"
-        if what != "standard deviation":
-            found.append(quantity(value, replace(place, long_name=f"{what} of {parameter.long_name}"), at))
-            continue
-        share = isinstance(value, str) and value.strip().endswith("%")
-        unit = "1" if share else parameter.unit
-        number = quantity(value, Parameter(unit, f"{what} of {parameter.long_name}", lower=0, open_lower=True), at)
+    for k, (what, value) in enumerate(zip(arguments, given, strict=True)):
+        at, scatter = f"{where}.{k}", what == "standard deviation"
+        share = scatter and isinstance(value, str) and value.strip().endswith("%")
+        least = 0.0 if scatter else -math.inf
+        number = Parameter("1" if share else parameter.unit, f"{what} of {parameter.long_name}", least, open_lower=True)
         if share and found[0] == 0.0:
             raise InputError(at, f"{show(value)} of a mean of 0 is nothing: give the standard deviation itself")
-        found.append(number * abs(found[0]) if share else number)
-    if problem := distribution.problem(*found):
+        found.append(quantity(value, number, at) * (abs(found[0]) if share else 1.0))
+    ends = found if kind in ("uniform", "triangular") else found[2:]
+    if ends and not (ends[0] < ends[-1] and ends == sorted(ends)):
+        problem = "the first end must be less than the last, a mode between them"
         raise InputError(where, f"{problem}, got {show(given)} ({wanted})")
-    try:
-        with np.errstate(all="ignore"):
-            ends = distribution.quantile(_FAR, *found)
-    except OverflowError:
-        ends = np.full(2, np.inf)
-    if not np.isfinite(ends).all():
+    if kind == "lognormal" and found[0] <= 0.0:
+        raise InputError(where, f"the mean must be greater than 0, got {show(given)} ({wanted})")
+    with np.errstate(all="ignore"):
+        far = distribution(kind, *found).ppf(_FAR)
+    if not np.isfinite(far).all():
         raise InputError(where, f"{show(given)} reaches beyond the range of numbers")
     return tuple(found)
-
-
-def _ordered(factors: Mapping[str, Factor], scene: Scene, axes: Axes) -> tuple[Factor, ...]:
-    """Factors, each after the one that it is multiplied by."""
-    drawn = {path: where for where, factor in factors.items() for path in factor.paths}
-
-    def depth(where: str, through: tuple[str, ...] = ()) -> int:
-        """How many factors stand before one, each multiplied by the one before."""
-        over = factors[where].over
-        if over is None or over not in drawn:
-            if over is not None and over not in axes.columns and over not in scene.values:
-                raise InputError(f"{where}.over", f"{over} has no value in the scene, and no distribution")
-            return 0
-        if where in through:
-            raise InputError(f"{where}.over", f"{over} is itself drawn over {factors[where].paths[0]}")
-        return 1 + depth(drawn[over], (*through, where))
-
-    return tuple(factors[where] for where in sorted(factors, key=depth))
 
 
 def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
@@ -417,45 +401,34 @@ def _survival(given: Any, scene: Scene) -> tuple[float, ...]:
 def _check_points(sample: Sample, scene: Scene, axes: Axes) -> None:
     """Make sure that every point of the sample is allowed, in every cell of the grid."""
     known = sweepable(scene)
-    for replicate in range(sample.replicates):
-        found = sample.axes(scene, axes, sample.shares(replicate))
-        for factor in sample.factors:
-            for path in factor.paths:
-                values, parameter = found.columns[path][1], known[path]
-                assert isinstance(parameter, Parameter)
-                wrong = [end for end in (values.min(), values.max()) if not parameter.allows(float(end))]
-                if wrong:
-                    unit = after_number(parameter.unit)
-                    raise InputError(
-                        f"sweep.sample.of.{factor.name}",
-                        f"draws {wrong[0]:.3g}{unit}, but {parameter.long_name} must be "
-                        f"{parameter.interval}{unit}: {_probability(sample, factor, parameter)} "
-                        "(truncnormal and uniform have ends)",
+    found = sample.axes(scene, axes, sample.shares)
+    for factor in sample.factors:
+        for path in factor.paths:
+            values, parameter = found.columns[path][1], known[path]
+            assert isinstance(parameter, Parameter)
+            for wrong in (end for end in (values.min(), values.max()) if not parameter.allows(float(end))):
+                unit, share = after_number(parameter.unit), "a ratio that draws it is not allowed"
+                if factor.over is None:
+                    drawn = distribution(factor.kind, *factor.numbers)
+                    share = (
+                        f"{factor} has probability {drawn.cdf(parameter.lower) + drawn.sf(parameter.upper):.2g} of that"
                     )
-        try:
-            check_consistency(scene, found)
-        except InputError as error:
-            error.problem += f": {_share_refused(sample, scene, axes)} of the points of the sample are not allowed"
-            error.problem += " (`over` ties one number to another)"
-            raise
-
-
-def _probability(sample: Sample, factor: Factor, parameter: Parameter) -> str:
-    """Probability with which a factor draws a value that is not allowed, in words."""
-    if factor.over is not None:
-        return "a ratio that draws it is not allowed"
-    # The distribution function is the inverse of a monotone function: a table of its values is exact enough.
-    shares = np.concatenate([np.geomspace(1e-12, 1e-3, 400), np.linspace(1e-3, 1.0, 40_001)[1:-1]])
-    shares = np.unique(np.concatenate([shares, 1.0 - shares]))
-    values = next(iter(factor.draw(shares).values()))
-    allowed = np.array([parameter.allows(value) for value in values.tolist()])
-    edges = np.concatenate([[0.0], 0.5 * (shares[1:] + shares[:-1]), [1.0]])
-    return f"{factor} has probability {np.diff(edges)[~allowed].sum():.2g} of that"
+                raise InputError(
+                    f"sweep.sample.of.{factor.name}",
+                    f"draws {wrong:.3g}{unit}, but {parameter.long_name} must be {parameter.interval}{unit}: "
+                    f"{share} (truncnormal and uniform have ends)",
+                )
+    try:
+        check_consistency(scene, found)
+    except InputError as error:
+        error.problem += f": {_share_refused(sample, scene, axes)} of the points of the sample are not allowed"
+        error.problem += " (`over` ties one number to another)"
+        raise
 
 
 def _share_refused(sample: Sample, scene: Scene, axes: Axes) -> str:
     """Share of the points that the model refuses, of the first ones."""
-    shares = sample.shares(0)[:_TRIED]
+    shares = sample.shares[:_TRIED]
     refused = 0
     for row in shares:
         try:
