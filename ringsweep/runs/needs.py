@@ -148,7 +148,7 @@ def _seconds_of_run(config: Config) -> float:
     solver, sample = config.solver, config.sample
     limits = {field.name for field in fields(solver)} & {"steps", "max_steps"}
     few = replace(solver, **{name: min(getattr(solver, name), _FEW) for name in limits})
-    axes = config.axes if sample is None else sample.axes(config.scene, config.axes, sample.shares[0])
+    axes = config.axes if sample is None else sample.axes(config.scene, config.axes, sample.shares)
     # A cell that starts from another one costs about as much.
     one = replace(config, axes=axes, sample=None, follow=None, solver=few)
     layout = Layout(tuple(axes.sizes.values()))
