@@ -178,13 +178,11 @@ class TestFrictionLoop:
 
 @pytest.mark.parametrize("draw", [plots.phase_portrait, plots.friction_loop, plots.animation])
 class TestRefused:
-    def test_picture_refuses_a_run_of_an_earlier_version(self, run, draw):
-        with pytest.raises(InputError, match=r"has no belt_velocity.*run it again"):
-            draw(run.drop_vars("belt_velocity"))
-
-    def test_picture_refuses_several_friction_laws(self, run, draw):
-        with pytest.raises(InputError, match="choose one"):
-            draw(run.expand_dims(friction_law=["stiction", "coulomb"]))
+    def test_pictures_of_a_belt_refuse_other_datasets(self, run, draw):
+        several = run.expand_dims(friction_law=["stiction", "coulomb"])
+        for ds, told in ((run.drop_vars("belt_velocity"), r"no belt_velocity.*run it again"), (several, "choose one")):
+            with pytest.raises(InputError, match=told):
+                draw(ds)
 
 
 @pytest.fixture(scope="module")
