@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
-from ringsweep.config import load
+from ringsweep.config import load, sections
 from ringsweep.models import MODELS, batch, parameters
 from ringsweep.models.scene import Structure
 from ringsweep.runs import task_sizes
@@ -103,6 +103,12 @@ FIGURES: Mapping[int, Figure] = MappingProxyType(
         33: _figure("arctan", 5000, 1, (0.2, 0.15), (0.15, 0.1), 1e5, 2e-6, initial__omega=100),
     }
 )
+
+
+@pytest.fixture(autouse=True)
+def each_test_is_warned() -> None:
+    """A warning that an earlier test of this process has met is given again."""
+    sections.warn_once.cache_clear()
 
 
 @pytest.fixture(scope="session")

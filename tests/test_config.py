@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 import ringsweep
-from ringsweep.config import load, read_axes, read_scene, sections, with_values
+from ringsweep.config import load, read_axes, read_scene, with_values
 from ringsweep.config.axes import read_spacing
 from ringsweep.config.schema import _number, schema
 from ringsweep.config.solver import read_solver
@@ -91,7 +91,6 @@ def told(caplog):
     """Messages of a call that is made twice in one process."""
 
     def messages(call, *arguments):
-        sections.warn_once.cache_clear()
         caplog.clear()
         for _ in range(2):
             call(*arguments)
