@@ -1,6 +1,28 @@
 """Belts of one kind: tests whose claims do not depend on the parts of a belt share one kernel for each law."""
 
 
+def on_belt(
+    friction, stiffness=1.0, *, mass=1.0, cubic=None, damping=None, velocity=None, gravity=None, force=None,
+    start=None, span=None,
+):  # fmt: skip
+    """Scene of a body on a belt, from its numbers (SI).
+
+    A force is its amplitude, frequency and, if it has one, phase; a start is a displacement, or displacement and
+    velocity. What is not given is left out.
+    """
+    spring = {"stiffness": stiffness} | ({} if cubic is None else {"cubic": cubic})
+    found = {"model": "belt", "body": {"mass": mass}, "spring": spring, "friction": friction}
+    parts = {"damper": ("coefficient", damping), "belt": ("velocity", velocity), "time": ("span", span)}
+    found |= {part: {name: value} for part, (name, value) in parts.items() if value is not None}
+    if gravity is not None:
+        found["gravity"] = gravity
+    if force is not None:
+        found["force"] = dict(zip(("amplitude", "frequency", "phase"), force, strict=False))
+    if start is not None:
+        found["initial"] = dict(zip(("x", "velocity"), start, strict=False))
+    return found
+
+
 def with_all_parts(scene):
     """A scene on a belt of constant velocity, with cubic spring, damper and force; those that it lacks are 0."""
     spring, damper = {"cubic": 0.0} | scene["spring"], {"coefficient": 0.0} | scene.get("damper", {})

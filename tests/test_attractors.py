@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 
 import ringsweep
 from ringsweep import InputError
@@ -119,16 +119,13 @@ def test_a_sweep_without_a_section_is_refused():
 
 def belt(velocity, law=None, **sections):
     """Friction oscillator of Stender and Hoffmann, bSTAB, Nonlinear Dyn. 107 (2022)."""
-    scene = {
-        "model": "belt",
-        "gravity": 1.0,
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 1.0},
-        "damper": {"coefficient": 0.1},
-        "belt": {"velocity": velocity},
-        "friction": law or {"law": "tustin", "mu_s": 1.0, "mu_k": 0.5, "alpha": 2.0},
-        "time": {"span": 600.0},
-    }
+    scene = on_belt(
+        law or {"law": "tustin", "mu_s": 1.0, "mu_k": 0.5, "alpha": 2.0},
+        damping=0.1,
+        velocity=velocity,
+        span=600.0,
+        gravity=1.0,
+    )
     scene = with_all_parts(scene | sections.pop("scene", {}))
     return ringsweep.run({"scene": scene, **sections}, jobs=1, progress=False)
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 from tiers import mostly_slow
 
 import ringsweep
@@ -23,15 +23,7 @@ def belt(law="stiction", *, m=1.0, k=2.0, v_b=0.1, mu_s=0.15, mu_k=0.1, span=60.
     friction = {"law": law, "mu_s": mu_s, "mu_k": mu_k, **of_law}
     if law in ("coulomb", "threlfall", "dahl", "bristle"):
         del friction["mu_s"]
-    scene = {
-        "model": "belt",
-        "body": {"mass": m},
-        "spring": {"stiffness": k},
-        "belt": {"velocity": v_b},
-        "friction": friction,
-        "initial": {"x": 0.0, "velocity": v_b if start is None else start},
-        "time": {"span": span},
-    }
+    scene = on_belt(friction, k, mass=m, velocity=v_b, span=span, start=(0.0, v_b if start is None else start))
     # The kernels of these laws for a belt with all parts are compiled in any case, for forces on the body.
     return with_all_parts(scene) if law in ("karnopp", "bengisu-akay") else scene
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -14,18 +14,16 @@ from ringsweep.models import cycles
 
 def scene(law, omega, amplitude, *, x=0.0, v_belt=1.0, cubic=0.0, damping=0.0, **friction):
     """A body of 1 kg on a spring of 1 N/m, g = 1 m/s^2, under a force (N) at `omega` (rad/s)."""
-    return {
-        "model": "belt",
-        "gravity": 1.0,
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 1.0, "cubic": cubic},
-        "damper": {"coefficient": damping},
-        "belt": {"velocity": v_belt},
-        "friction": {"law": law, **friction},
-        "force": {"amplitude": amplitude, "frequency": omega / (2.0 * pi)},
-        "initial": {"x": x, "velocity": 0.0},
-        "time": {"span": 100.0},
-    }
+    return on_belt(
+        {"law": law, **friction},
+        cubic=cubic,
+        damping=damping,
+        velocity=v_belt,
+        span=100.0,
+        gravity=1.0,
+        force=(amplitude, omega / (2.0 * pi)),
+        start=(x, 0.0),
+    )
 
 
 def over(of, omega, periods, exponent=False):
@@ -177,13 +175,8 @@ def test_belt_that_vibrates_unevenly_conveys_a_body():
     a, omega, mu = 0.05, 10.0, 0.02
     start = -np.arccos(-mu * 9.81 * pi / (2.0 * a * omega**2))
     drift = a * omega * (np.cos(start) + 0.2 * np.cos(2.0 * start)) + mu * 9.81 * pi / (2.0 * omega)
-    of = {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 0.0},
-        "drive": {"law": "formula", "theta": "a*(sin(w*t) + 0.1*sin(2*w*t))", "a": a, "w": omega},
-        "friction": {"law": "stiction", "mu_s": 0.03, "mu_k": mu},
-        "initial": {"x": 0.0, "velocity": 0.0},
+    of = on_belt({"law": "stiction", "mu_s": 0.03, "mu_k": mu}, 0.0, start=(0.0, 0.0)) | {
+        "drive": {"law": "formula", "theta": "a*(sin(w*t) + 0.1*sin(2*w*t))", "a": a, "w": omega}
     }
     found = ringsweep.sweep(of, {"time.span": [100.0, 1000.0]}, progress=False)
     assert words(found) == ["periodic"] * 2
@@ -201,17 +194,14 @@ def test_drift_without_cycles_is_that_of_the_second_half_of_the_span():
 
 def branch(frequency, x, velocity, spans):
     """Runs that begin beside a motion that a change of the frequency has made unstable, as a followed branch does."""
-    of = {
-        "model": "belt",
-        "gravity": 1.0,
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 1.0},
-        "damper": {"coefficient": 0.05},
-        "belt": {"velocity": 0.3},
-        "friction": {"law": "tustin", "mu_s": 0.4, "mu_k": 0.15, "alpha": 3.0},
-        "force": {"amplitude": 0.3, "frequency": frequency},
-        "initial": {"x": x, "velocity": velocity},
-    }
+    of = on_belt(
+        {"law": "tustin", "mu_s": 0.4, "mu_k": 0.15, "alpha": 3.0},
+        damping=0.05,
+        velocity=0.3,
+        gravity=1.0,
+        force=(0.3, frequency),
+        start=(x, velocity),
+    )
     return over(of, 2.0 * pi * frequency, [int(span * frequency) for span in spans], exponent=True)
 
 
@@ -293,15 +283,7 @@ def test_period_of_thirteen_cycles_is_found_in_each_span():
 
 def test_words_of_free_motions():
     """Stick-slip of three cycles erased its past; steady slip is steady; a body at rest on a belt at rest rests."""
-    free = {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 2.0},
-        "belt": {"velocity": 0.1},
-        "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
-        "initial": {"x": 0.0, "velocity": 0.0},
-        "time": {"span": 30.0},
-    }
+    free = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=30.0, start=(0.0, 0.0))
     points = {
         "belt.velocity": [0.1, 0.1, 0.1, 0.0, 0.1],
         "initial.x": [0.0, 0.45, 0.0, 1.0, 0.0],

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 from tiers import mostly_slow
 
 import ringsweep
@@ -15,13 +15,8 @@ from ringsweep.quantities.flags import REGIMES
 
 def scene(law, *, k=2.0, drive=None, belt=None, x=0.0, velocity=None, span=60.0, **friction):
     """A body of 1 kg on a belt of constant velocity, or on one that moves as amplitude (m) times sin(2 pi f t)."""
-    found = {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": k},
-        "friction": {"law": law, **friction},
-        "initial": {"x": x} | ({} if velocity is None else {"velocity": velocity}),
-        "time": {"span": span},
+    found = on_belt({"law": law, **friction}, k, span=span) | {
+        "initial": {"x": x} | ({} if velocity is None else {"velocity": velocity})
     }
     if drive is not None:
         found["drive"] = {"law": "sinusoidal", "amplitude": drive[0], "frequency": drive[1]}

@@ -6,6 +6,7 @@ from math import cos, log, pi, sqrt, tanh
 import numpy as np
 import pytest
 import xarray as xr
+from belts import on_belt
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -351,13 +352,7 @@ def breakaways():
 
     The span ends soon after the body begins to slip, so that the viscous force stays small.
     """
-    scene = {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": STIFFNESS},
-        "friction": {"law": "lugre", "mu_s": STATIC, "mu_k": KINETIC_1995, **OF_1995},
-        "time": {"span": 1.0},
-    }
+    scene = on_belt({"law": "lugre", "mu_s": STATIC, "mu_k": KINETIC_1995, **OF_1995}, STIFFNESS, span=1.0)
     axes = {
         "belt.velocity": xr.DataArray(RATES / STIFFNESS, dims="rate"),
         "time.span": xr.DataArray(1.5 / RATES + 0.1, dims="rate"),

@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from belts import on_belt
 from solutions import HISTORY, solve
 
 import ringsweep
@@ -364,16 +365,15 @@ class TestErrors:
 class TestChaos:
     """A mass on a cubic spring under 300 periods of a force: nearby runs diverge."""
 
-    SCENE: ClassVar = {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 0.1, "cubic": 1.0},
-        "damper": {"coefficient": 0.046},
-        "friction": {"law": "tustin", "mu_s": 0.0180848, "mu_k": 0.0113261, "alpha": 5.77},
-        "belt": {"velocity": 0.174811},
-        "force": {"amplitude": 4.93, "frequency": 0.134},
-        "time": {"span": 2238.81},
-    }
+    SCENE: ClassVar = on_belt(
+        {"law": "tustin", "mu_s": 0.0180848, "mu_k": 0.0113261, "alpha": 5.77},
+        0.1,
+        cubic=1.0,
+        damping=0.046,
+        velocity=0.174811,
+        span=2238.81,
+        force=(4.93, 0.134),
+    )
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -403,14 +403,9 @@ class TestChaos:
 
 @pytest.mark.slow
 def test_greatest_velocity_of_a_body_that_rides_on_a_belt_is_that_of_the_belt():
-    scene = {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 1.0, "cubic": 0.0},
-        "friction": {"law": "stiction", "mu_s": 0.9, "mu_k": 0.8},
-        "drive": {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.7, "phase": 1.0},
+    scene = on_belt({"law": "stiction", "mu_s": 0.9, "mu_k": 0.8}, cubic=0.0, span=5.0) | {
         "initial": {"velocity": float(0.1 * 2.0 * np.pi * 0.7 * np.cos(1.0))},
-        "time": {"span": 5.0},
+        "drive": {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.7, "phase": 1.0},
     }
     found = ringsweep.sweep(scene, {"drive.frequency": [0.7]})
     assert ringsweep.words(found.regime).values[0] == "riding"

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from belts import on_belt
 
 import ringsweep
 from ringsweep.storage import netcdf
@@ -12,14 +13,7 @@ pytestmark = pytest.mark.slow
 
 runner = pytest.importorskip("compliance_checker.runner")
 
-BELT = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 2.0},
-    "belt": {"velocity": 0.1},
-    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
-    "time": {"span": 20.0},
-}
+BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=20.0)
 SPEEDS = {"belt.velocity": np.linspace(0.05, 0.2, 4).tolist(), "friction.mu_s": [0.12, 0.15, 0.2]}
 
 #: A history has each event twice, before and after, and counts seconds since its start rather than since a date.

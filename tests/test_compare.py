@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from belts import on_belt
 from jsonschema import Draft202012Validator
 
 import ringsweep
@@ -22,15 +23,8 @@ from ringsweep.storage import netcdf
 CONFIGS = Path(__file__).parents[1] / "configs"
 LAWS = ["coulomb", "stiction", "tustin"]
 CONFIG = {
-    "scene": {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 2.0},
-        "belt": {"velocity": 0.1},
-        "friction": {"mu_s": 0.15, "mu_k": 0.1, "alpha": 10.0},
-        "initial": {"velocity": 0.0},
-        "time": {"span": 20.0},
-    },
+    "scene": on_belt({"mu_s": 0.15, "mu_k": 0.1, "alpha": 10.0}, 2.0, velocity=0.1, span=20.0)
+    | {"initial": {"velocity": 0.0}},
     "sweep": {"grid": {"friction.law": LAWS, "belt.velocity": [0.05, 0.1]}},
 }
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from rings import course, rubs, shape
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -19,16 +20,11 @@ STEEP = {
 }
 
 #: A ring that swings, with a body launched at its speed.
-SWINGING = {
-    "model": "ring",
-    "body": {"mass": 0.1, "inertia": 2.5e-5, "half_distance": 0.025, "ball_radius": 0.01},
-    "ring": {"radius": 0.05},
-    "friction": {"law": "stiction", "rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.5, "mu_k": 0.3}},
-    "zone": {"half_angle": 0.6},
-    "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": 2.0},
-    "initial": {"phi": 0.3, "omega": 4.0 * np.pi},
-    "time": {"span": 1.0},
-}
+SWINGING = (
+    shape(0.1, 2.5e-5, 0.025, 0.01, 0.05, zone=0.6)
+    | rubs("stiction", rest=(0.5, 0.3), rough=(0.5, 0.3))
+    | course("sinusoidal", 1.0, 2.0, phi=0.3, omega=4.0 * np.pi, span=1.0)
+)
 
 #: Swinging rings in which a reaction reaches 0 while the body sticks, and slip with both contacts closed would be
 #: possible. The numbers are those of COLUMNS, then the contact.

@@ -2,18 +2,12 @@
 
 import numpy as np
 import pytest
+from belts import on_belt
 
 import ringsweep
 from ringsweep.cli.report import events_in_words
 
-BELT = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 2.0},
-    "belt": {"velocity": 0.1},
-    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
-    "time": {"span": 20.0},
-}
+BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=20.0)
 
 
 def told(run, kind):

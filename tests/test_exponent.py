@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -226,15 +226,15 @@ def test_a_steep_smooth_law_has_the_multipliers_of_the_law_that_jumps():
 @pytest.mark.slow
 def test_friction_that_falls_within_a_micrometre_a_second_has_the_exponent_of_neighbouring_runs():
     """A step through the fall of friction holds many times in which a disturbance grows by a factor of e."""
-    scene = {
-        "model": "belt",
-        "body": {"mass": 0.432273},
-        "spring": {"stiffness": 22.8094, "cubic": 441.366},
-        "friction": {"law": "tustin", "mu_s": 0.208922, "mu_k": 0.0993472, "alpha": 1e6},
-        "belt": {"velocity": 0.0},
-        "force": {"amplitude": 1.49253, "frequency": 0.446578, "phase": -2.48131},
-        "initial": {"x": 0.1, "velocity": 0.0},
-    }
+    scene = on_belt(
+        {"law": "tustin", "mu_s": 0.208922, "mu_k": 0.0993472, "alpha": 1e6},
+        22.8094,
+        mass=0.432273,
+        cubic=441.366,
+        velocity=0.0,
+        force=(1.49253, 0.446578, -2.48131),
+        start=(0.1, 0.0),
+    )
     periods, left_out, distance = 60, 20, 1e-8
     found = run(scene | {"time": {"span": 100 / 0.446578}}, {"initial.x": [0.1]})
     at, apart, growth = np.array([0.1, 0.0]), np.array([distance, 0.0]), []

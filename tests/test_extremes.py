@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 from tiers import mostly_slow
 
 import ringsweep
@@ -25,14 +25,7 @@ COMMON = ("stiction", "bengisu-akay", "lugre")
 
 def belt(law, **changes):
     """A body of 1 kg on a spring of 4 N/m, on a belt at rest."""
-    scene = {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 4.0},
-        "belt": {"velocity": 0.0},
-        "friction": {"law": law, "mu_s": 0.4, "mu_k": 0.25, **LAWS[law]},
-        "time": {"span": 20.0},
-    }
+    scene = on_belt({"law": law, "mu_s": 0.4, "mu_k": 0.25, **LAWS[law]}, 4.0, velocity=0.0, span=20.0)
     return with_all_parts(scene | changes)
 
 

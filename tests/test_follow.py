@@ -6,7 +6,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import xarray as xr
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 
 import ringsweep
 from ringsweep import InputError, cli
@@ -18,31 +18,26 @@ from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint
 
 #: A spring that hardens, under a force: near 0.35 Hz a large and a small motion exist side by side.
-HARDENING = {
-    "model": "belt",
-    "gravity": 1.0,
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 1.0, "cubic": 1.0},
-    "damper": {"coefficient": 0.1},
-    "belt": {"velocity": 50.0},
-    "friction": {"law": "tustin", "mu_s": 1e-6, "mu_k": 1e-6, "alpha": 1.0},
-    "force": {"amplitude": 0.5, "frequency": 0.25},
-    "initial": {"x": 0.0, "velocity": 0.0},
-    "time": {"span": 199.0},
-}
+HARDENING = on_belt(
+    {"law": "tustin", "mu_s": 1e-6, "mu_k": 1e-6, "alpha": 1.0},
+    cubic=1.0,
+    damping=0.1,
+    velocity=50.0,
+    span=199.0,
+    gravity=1.0,
+    force=(0.5, 0.25),
+    start=(0.0, 0.0),
+)
 
-LUGRE = with_all_parts({
-    "model": "belt",
-    "gravity": 1.0,
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 1.0},
-    "belt": {"velocity": 0.1},
-    "friction": {
-        "law": "lugre", "mu_s": 0.15, "mu_k": 0.1, "sigma0": 100.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.05,
-    },
-    "force": {"amplitude": 0.05, "frequency": 0.2},
-    "time": {"span": 7.0},
-})  # fmt: skip
+LUGRE = with_all_parts(
+    on_belt(
+        {"law": "lugre", "mu_s": 0.15, "mu_k": 0.1, "sigma0": 100.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.05},
+        velocity=0.1,
+        span=7.0,
+        gravity=1.0,
+        force=(0.05, 0.2),
+    )
+)
 
 FREQUENCIES = [0.21, 0.24, 0.27, 0.3, 0.33, 0.36]
 

@@ -4,22 +4,14 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 
 import ringsweep
 from ringsweep.physics import drives
 from ringsweep.physics.forces import Forced
 
 #: A body of 1 kg on a spring of 1 N/m, with a damper of 4 N s/m.
-DAMPED = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 1.0, "cubic": 0.0},
-    "damper": {"coefficient": 4.0},
-    "belt": {"velocity": 0.0},
-    "friction": {"law": "coulomb", "mu_k": 0.0},
-    "time": {"span": 500.0},
-}
+DAMPED = on_belt({"law": "coulomb", "mu_k": 0.0}, cubic=0.0, damping=4.0, velocity=0.0, span=500.0)
 
 #: Two forces in a ratio of the golden mean, and other parts.
 TWO_FORCES = {

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from rings import bump, course, rubs, shape
 from scipy.optimize import linprog
 from tiers import mostly_slow
 
@@ -33,16 +34,11 @@ PARTICLE = {
     "time": {"span": "1.2 s"},
     "impact": {"restitution": 0},
 }
-BODY = {
-    "model": "ring",
-    "body": {"mass": 0.076, "inertia": 4.2e-5, "half_distance": 0.0315, "ball_radius": 0.008},
-    "ring": {"radius": 0.043378},
-    "zone": {"half_angle": "15 deg"},
-    "friction": {"law": "stiction", "rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}},
-    "drive": {"law": "arctan", "amplitude": 3},
-    "time": {"span": "5 s"},
-    "impact": {"restitution": 0.5},
-}
+BODY = (
+    shape(0.076, 4.2e-5, 0.0315, 0.008, 0.043378, zone="15 deg")
+    | rubs("stiction", rest=(0.2, 0.1), rough=(0.5, 0.3))
+    | course("arctan", 3, span="5 s", e=0.5)
+)
 #: Friction is mu_s below the speed vb, and mu_k above.
 JUMPING = {
     "model": "ring",
@@ -115,26 +111,11 @@ class TestParticle:
 
 
 # A narrow body that rocks from one contact to the other until it rests.
-ROCKER = {
-    "model": "ring",
-    "body": {
-        "mass": 0.225806,
-        "inertia": 2.00695e-5,
-        "half_distance": 0.0122934,
-        "ball_radius": 0.0205493,
-        "center_offset": -0.0107898,
-    },
-    "ring": {"radius": 0.0768918},
-    "friction": {
-        "law": "stiction",
-        "rest": {"mu_s": 0.709165, "mu_k": 0.359963},
-        "rough": {"mu_s": 0.48937, "mu_k": 0.241918},
-    },
-    "zone": {"half_angle": 0.414367, "center": 2.11475},
-    "drive": {"law": "constant", "amplitude": -0.474327},
-    "impact": {"restitution": 0.0551761},
-    "time": {"span": 0.02},
-}
+ROCKER = (
+    shape(0.225806, 2.00695e-5, 0.0122934, 0.0205493, 0.0768918, offset=-0.0107898, zone=(0.414367, 2.11475))
+    | rubs("stiction", rest=(0.709165, 0.359963), rough=(0.48937, 0.241918))
+    | course("constant", -0.474327, span=0.02, e=0.0551761)
+)
 
 
 class TestBody:
@@ -312,19 +293,12 @@ class TestBody:
 
         There it slides against the direction in which it rolls. Word and numbers are those of ``benchmarks.reference``.
         """
-        scene = BODY | {
-            "body": {"mass": 0.267278, "inertia": 0.000496468, "half_distance": 0.0440407, "ball_radius": 0.0191723},
-            "ring": {"radius": 0.0741464},
-            "zone": {"half_angle": 2.86196, "center": pi},
-            "friction": {
-                "law": "stiction",
-                "rough": {"mu_s": 0.0175763, "mu_k": 0.00977993},
-                "rest": {"mu_s": 0.576639, "mu_k": 0.327377},
-            },
-            "drive": {"law": "arctan", "amplitude": 0.533024},
-            "initial": {"omega": -20.1769},
-            "time": {"span": 2.08644},
-        }
+        scene = (
+            BODY
+            | shape(0.267278, 0.000496468, 0.0440407, 0.0191723, 0.0741464, zone=(2.86196, pi))
+            | rubs("stiction", rest=(0.576639, 0.327377), rough=(0.0175763, 0.00977993))
+            | course("arctan", 0.533024, omega=-20.1769, span=2.08644)
+        )
         found = ringsweep.sweep(scene, {"impact.restitution": [0.599883]}, progress=False)
         assert ringsweep.words(found.aftermath).item() == "tumbled"
         assert found.t_end.item() == 2.08644
@@ -333,18 +307,12 @@ class TestBody:
 
     def test_body_has_tumbled_once_a_contact_hits_beside_the_other_one_even_if_it_rebounds(self):
         """A body on compliant contacts, ``benchmarks.reference.rattling``, lies on both of them soon afterwards."""
-        scene = BODY | {
-            "body": JUMPING["body"],
-            "zone": {"half_angle": 2.42694, "center": 2.80857},
-            "friction": {
-                "law": "stiction",
-                "rough": {"mu_s": 0.825201, "mu_k": 0.451686},
-                "rest": {"mu_s": 0.495015, "mu_k": 0.310563},
-            },
-            "drive": {"law": "arctan", "amplitude": -1.47684},
-            "initial": {"phi": -0.318961, "omega": 9.26745},
-            "impact": {"restitution": 0.277441},
-        }
+        scene = (
+            BODY
+            | rubs("stiction", rest=(0.495015, 0.310563), rough=(0.825201, 0.451686))
+            | course("arctan", -1.47684, phi=-0.318961, omega=9.26745, e=0.277441)
+            | {"body": JUMPING["body"], "zone": {"half_angle": 2.42694, "center": 2.80857}}
+        )
         found = ringsweep.sweep(scene, {"time.span": [1.69, 1.70, 1.74]}, progress=False)
         assert ringsweep.words(found.aftermath).values.tolist() == ["open", "tumbled", "tumbled"]
         assert found.impacts.values.tolist() == [0, 1, 2]
@@ -355,22 +323,11 @@ class TestBody:
     @pytest.mark.slow
     def test_reaction_that_changes_its_sign_through_infinity_jams_and_opens_no_contact(self):
         """The body pivots on a contact that would enter the race if it opened. The time is that of the reference."""
-        scene = {
-            "model": "ring",
-            "body": {
-                "mass": 0.475957, "inertia": 4.73961e-06, "half_distance": 0.00424212, "ball_radius": 0.0128909,
-                "center_offset": 0.0,
-            },
-            "ring": {"radius": 0.0420561},
-            "friction": {
-                "law": "tustin", "alpha": 1702030.0,
-                "rest": {"mu_s": 0.235758, "mu_k": 0.10485}, "rough": {"mu_s": 0.48332, "mu_k": 0.267488},
-            },
-            "zone": {"half_angle": 2.70773, "center": pi},
-            "drive": {"law": "power", "amplitude": 8.84074, "exponent": 1.53252},
-            "initial": {"phi": 2.84616, "omega": 89.1353},
-            "time": {"span": 0.256649},
-        }  # fmt: skip
+        scene = (
+            shape(0.475957, 4.73961e-06, 0.00424212, 0.0128909, 0.0420561, zone=(2.70773, pi))
+            | rubs("tustin", rest=(0.235758, 0.10485), rough=(0.48332, 0.267488), alpha=1702030.0)
+            | course("power", 8.84074, 1.53252, phi=2.84616, omega=89.1353, span=0.256649)
+        )
         found = ringsweep.sweep(scene | {"impact": {"restitution": 0.0}}, {"time.span": [0.256649]}, progress=False)
         assert found.t_end.item() == pytest.approx(0.24783247, abs=1e-7)
 
@@ -381,22 +338,11 @@ class TestBody:
         The greater the acceleration of the ring, the nearer, but the body turns alike. Under an infinite acceleration
         no step resolves it.
         """
-        scene = {
-            "model": "ring",
-            "body": {
-                "mass": 0.313781, "inertia": 0.000143466, "half_distance": 0.0270851, "ball_radius": 0.0190461,
-            },
-            "ring": {"radius": 0.0606886},
-            "friction": {
-                "law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
-                "vb": 0.0150096, "w": 0.00037879, "h": 0.337113,
-                "rest": {"mu_s": 1.17574, "mu_k": 0.830991}, "rough": {"mu_s": 0.648814, "mu_k": 0.597697},
-            },
-            "zone": {"half_angle": 0.267026, "center": -1.78478},
-            "drive": {"law": "power"},
-            "initial": {"phi": 1.17837},
-            "impact": {"restitution": 0.5},
-        }  # fmt: skip
+        scene = (
+            shape(0.313781, 0.000143466, 0.0270851, 0.0190461, 0.0606886, zone=(0.267026, -1.78478))
+            | bump(rest=(1.17574, 0.830991), rough=(0.648814, 0.597697), vb=0.0150096, w=0.00037879, h=0.337113)
+            | course("power", phi=1.17837, e=0.5)
+        )
         drives = {
             "drive.amplitude": [0.5e5, 0.5e6, 1.21617],
             "drive.exponent": [2.0, 2.0, 1.05325],
@@ -417,21 +363,12 @@ class TestBody:
         Among the last of unending rebounds, of 1e-8 m/s, the body closes and goes on. The gap is that of
         ``benchmarks.reference``.
         """
-        scene = BODY | {
-            "body": {
-                "mass": 0.213905, "inertia": 6.69e-05, "half_distance": 0.0255529, "ball_radius": 0.00972928,
-                "center_offset": 0.0,
-            },
-            "ring": {"radius": 0.0362977},
-            "friction": {
-                "law": "tustin", "alpha": 1702030.0,
-                "rest": {"mu_s": 0.366641, "mu_k": 0.366641}, "rough": {"mu_s": 0.00943182, "mu_k": 0.00778139},
-            },
-            "zone": {"half_angle": 1.03967, "center": 2.16646},
-            "drive": {"law": "power", "amplitude": -6.43394, "exponent": 2.20164},
-            "initial": {"phi": 1.03281, "omega": 0.0},
-            "impact": {"restitution": 0.7348},
-        }  # fmt: skip
+        scene = (
+            BODY
+            | shape(0.213905, 6.69e-05, 0.0255529, 0.00972928, 0.0362977, zone=(1.03967, 2.16646))
+            | rubs("tustin", rest=(0.366641, 0.366641), rough=(0.00943182, 0.00778139), alpha=1702030.0)
+            | course("power", -6.43394, 2.20164, phi=1.03281, omega=0.0, e=0.7348)
+        )
         found = ringsweep.sweep(scene, {"time.span": [1.2]}, progress=False)
         assert found.t_end.item() == 1.2
         assert found.gap_max.item() == pytest.approx(0.002025674, abs=1e-9)
@@ -441,19 +378,12 @@ class TestBody:
 
         The numbers are those of the reference.
         """
-        scene = BODY | {
-            "body": {"mass": 0.364591, "inertia": 0.000196867, "half_distance": 0.0193353, "ball_radius": 0.00469679},
-            "ring": {"radius": 0.0315957},
-            "zone": {"half_angle": 2.0, "center": pi},
-            "friction": {
-                "law": "stiction",
-                "rest": {"mu_s": 0.223021, "mu_k": 0.166925},
-                "rough": {"mu_s": 0.718786, "mu_k": 0.355663},
-            },
-            "drive": {"law": "arctan", "amplitude": -8.66607},
-            "initial": {"phi": -1.08749, "omega": 22.8486},
-            "time": {"span": 1.0},
-        }
+        scene = (
+            BODY
+            | shape(0.364591, 0.000196867, 0.0193353, 0.00469679, 0.0315957, zone=(2.0, pi))
+            | rubs("stiction", rest=(0.223021, 0.166925), rough=(0.718786, 0.355663))
+            | course("arctan", -8.66607, phi=-1.08749, omega=22.8486, span=1.0)
+        )
         found = ringsweep.sweep(scene, {"impact.restitution": [0.169101]}, progress=False)
         assert ringsweep.words(found.aftermath).item() == "tumbled"
         assert found.phi_end.item() == pytest.approx(-3.1472056528869796, rel=1e-9)
@@ -487,19 +417,12 @@ class TestBody:
 
     def test_contacts_that_rebound_in_turn_close_together(self):
         """Each impact at one contact brings the other one down, until both hold. The angle is that of the reference."""
-        scene = BODY | {
-            "body": {"mass": 0.34295, "inertia": 0.00034546, "half_distance": 0.039532, "ball_radius": 0.02979},
-            "ring": {"radius": 0.073942},
-            "zone": {"half_angle": 2.0, "center": pi},
-            "friction": {
-                "law": "stiction",
-                "rest": {"mu_s": 0.52646, "mu_k": 0.50751},
-                "rough": {"mu_s": 0.69648, "mu_k": 0.4932},
-            },
-            "drive": {"law": "arctan", "amplitude": -2.8076},
-            "initial": {"phi": 2.8394, "omega": 2.8514},
-            "time": {"span": 1.0},
-        }
+        scene = (
+            BODY
+            | shape(0.34295, 0.00034546, 0.039532, 0.02979, 0.073942, zone=(2.0, pi))
+            | rubs("stiction", rest=(0.52646, 0.50751), rough=(0.69648, 0.4932))
+            | course("arctan", -2.8076, phi=2.8394, omega=2.8514, span=1.0)
+        )
         found = ringsweep.sweep(scene, {"impact.restitution": [0.11094]}, progress=False)
         assert found.t_end.item() == 1.0
         assert found.phi_end.item() == pytest.approx(1.9295466835627817, rel=1e-9)
@@ -509,58 +432,31 @@ class TestBody:
         ("scene", "phi_end"),
         [
             # Pushed off both contacts, the body stays at rest while the ring has moved on.
-            pytest.param({
-                "friction": {
-                    "law": "tustin", "alpha": 16.9413,
-                    "rest": {"mu_s": 0.391247, "mu_k": 0.124068}, "rough": {"mu_s": 0.521341, "mu_k": 0.26673},
-                },
-                "drive": {"law": "power", "amplitude": 0.169772, "exponent": 1.05595},
-                "body": {
-                    "mass": 0.0622681, "inertia": 4.35788e-05, "half_distance": 0.0263802, "ball_radius": 0.0238993,
-                    "center_offset": 0.0,
-                },
-                "ring": {"radius": 0.0987501},
-                "zone": {"half_angle": 1.08239, "center": 2.715},
-                "time": {"span": 0.924103},
-                "initial": {"phi": -2.75764, "omega": 0.0},
-                "impact": {"restitution": 0.803551},
-            }, -3.059077252, id="off both"),
+            pytest.param(
+                shape(0.0622681, 4.35788e-05, 0.0263802, 0.0238993, 0.0987501, zone=(1.08239, 2.715))
+                | rubs("tustin", rest=(0.391247, 0.124068), rough=(0.521341, 0.26673), alpha=16.9413)
+                | course("power", 0.169772, 1.05595, phi=-2.75764, omega=0.0, span=0.924103, e=0.803551),
+                -3.059077252,
+                id="off both",
+            ),
             # A body that is wedged on one contact is taken along.
-            pytest.param({
-                "friction": {
-                    "law": "tustin", "alpha": 20800.1,
-                    "rest": {"mu_s": 0.435147, "mu_k": 0.435147}, "rough": {"mu_s": 0.333057, "mu_k": 0.0930198},
-                },
-                "drive": {"law": "power", "amplitude": 9.3018, "exponent": 1.71787},
-                "body": {
-                    "mass": 0.382064, "inertia": 2.82698e-06, "half_distance": 0.00257343, "ball_radius": 0.0165818,
-                    "center_offset": 0.0,
-                },
-                "ring": {"radius": 0.0421444},
-                "zone": {"half_angle": 2.85642, "center": 1.33532},
-                "time": {"span": 2.59935},
-                "initial": {"phi": 1.22941, "omega": 0.0},
-                "impact": {"restitution": 0.401576},
-            }, 2.351071097, id="wedged on one"),
+            pytest.param(
+                shape(0.382064, 2.82698e-06, 0.00257343, 0.0165818, 0.0421444, zone=(2.85642, 1.33532))
+                | rubs("tustin", rest=(0.435147, 0.435147), rough=(0.333057, 0.0930198), alpha=20800.1)
+                | course("power", 9.3018, 1.71787, phi=1.22941, omega=0.0, span=2.59935, e=0.401576),
+                2.351071097,
+                id="wedged on one",
+            ),
             # Its contacts hit so nearly at once that friction forbids both impacts together, but not in turn.
-            pytest.param({
-                "friction": {
-                    "law": "tustin", "alpha": 9.24635,
-                    "rest": {"mu_s": 0.484993, "mu_k": 0.471637}, "rough": {"mu_s": 0.0623722, "mu_k": 0.0607234},
-                },
-                "drive": {"law": "power", "amplitude": -0.186147, "exponent": 1.48619},
-                "body": {
-                    "mass": 0.0947472, "inertia": 4.42698e-07, "half_distance": 0.00433759, "ball_radius": 0.0168983,
-                    "center_offset": 0.0,
-                },
-                "ring": {"radius": 0.0427085},
-                "zone": {"half_angle": 1.4492, "center": pi},
-                "time": {"span": 1.74251},
-                "initial": {"phi": 1.02004, "omega": 0.0},
-                "impact": {"restitution": 0.772468},
-            }, 2.725634, id="both in turn"),
+            pytest.param(
+                shape(0.0947472, 4.42698e-07, 0.00433759, 0.0168983, 0.0427085, zone=(1.4492, pi))
+                | rubs("tustin", rest=(0.484993, 0.471637), rough=(0.0623722, 0.0607234), alpha=9.24635)
+                | course("power", -0.186147, 1.48619, phi=1.02004, omega=0.0, span=1.74251, e=0.772468),
+                2.725634,
+                id="both in turn",
+            ),
         ],
-    )  # fmt: skip
+    )
     def test_start_with_infinite_acceleration_goes_on_as_the_reference_does(self, scene, phi_end):
         found = ringsweep.sweep({"model": "ring"} | scene, {"time.span": [scene["time"]["span"]]}, progress=False)
         assert found.phi_end.item() == pytest.approx(phi_end, abs=1e-6)
@@ -568,13 +464,11 @@ class TestBody:
     @pytest.mark.slow
     def test_contact_that_opens_where_friction_jumps_at_a_speed_opens_by_its_acceleration(self):
         """The gap grows like t^2. The numbers are those of the free body, integrated by SciPy with its own balances."""
-        scene = JUMPING | {
-            "friction": JUMPING["friction"] | {"vb": 0.0548297, "rest": {"mu_s": 0.227239, "mu_k": 0.00340348}},
-            "drive": {"law": "sinusoidal", "amplitude": 0.0607017, "frequency": 2.35927, "phase": 0.5 * pi},
-            "initial": {"phi": 1.63614, "omega": 0.0},
-            "time": {"span": 0.3},
-            "impact": {"restitution": 0.0},
-        }
+        scene = (
+            JUMPING
+            | course("sinusoidal", 0.0607017, 2.35927, 0.5 * pi, phi=1.63614, omega=0.0, span=0.3, e=0.0)
+            | {"friction": JUMPING["friction"] | {"vb": 0.0548297, "rest": {"mu_s": 0.227239, "mu_k": 0.00340348}}}
+        )
         run = ringsweep.simulate(scene, samples=50)
         assert run.impact_time.values[-1] == pytest.approx(0.25515686191877684, rel=1e-9)
         assert run.impact_speed.values[-1] == pytest.approx(0.0024191139510299285, rel=1e-6)
@@ -582,14 +476,12 @@ class TestBody:
     @pytest.mark.slow
     def test_body_that_has_no_motion_where_friction_jumps_at_a_speed_jams(self):
         """Under the greater friction contact 2 would pull, and contact 1 alone would press itself into the race."""
-        scene = JUMPING | {
-            "body": {"mass": 0.362325, "inertia": 1.36913e-05, "half_distance": 0.0127683, "ball_radius": 0.0244479},
-            "ring": {"radius": 0.0645043},
-            "friction": JUMPING["friction"] | {"vb": 1.16804, "rest": {"mu_s": 0.780949, "mu_k": 0.430834}},
-            "drive": {"law": "sinusoidal", "amplitude": 0.0, "frequency": 1.0},
-            "initial": {"phi": 1.55313, "omega": -22.6359},
-            "impact": {"restitution": 0.0641463},
-        }
+        scene = (
+            JUMPING
+            | shape(0.362325, 1.36913e-05, 0.0127683, 0.0244479, 0.0645043)
+            | course("sinusoidal", 0.0, 1.0, phi=1.55313, omega=-22.6359, e=0.0641463)
+            | {"friction": JUMPING["friction"] | {"vb": 1.16804, "rest": {"mu_s": 0.780949, "mu_k": 0.430834}}}
+        )
         found = ringsweep.sweep(scene, {"time.span": [0.5]}, progress=False)
         assert ringsweep.words(found.regime).item() == "jammed"
         assert found.certified.item() == 1
@@ -630,22 +522,11 @@ class TestBody:
     @pytest.mark.slow
     def test_impact_of_a_wedged_body_has_its_solution_although_impulses_cancel(self):
         """Both impulses are 1e5 times the momentum. With 40 digits one of the 16 modes is admissible."""
-        scene = {
-            "model": "ring",
-            "friction": {
-                "law": "tustin", "alpha": 1859.76,
-                "rest": {"mu_s": 0.501325, "mu_k": 0.194777}, "rough": {"mu_s": 0.103706, "mu_k": 0.103706},
-            },
-            "drive": {"law": "power", "amplitude": 1.50143, "exponent": 2.92213},
-            "body": {
-                "mass": 0.149936, "inertia": 8.98195e-05, "half_distance": 0.0274996, "ball_radius": 0.00955871,
-                "center_offset": 0.00105183,
-            },
-            "ring": {"radius": 0.0375752},
-            "zone": {"half_angle": 0.153688, "center": 0.333103},
-            "initial": {"phi": 0.953257, "omega": 14.4442},
-            "impact": {"restitution": 0.71469},
-        }  # fmt: skip
+        scene = (
+            shape(0.149936, 8.98195e-05, 0.0274996, 0.00955871, 0.0375752, offset=0.00105183, zone=(0.153688, 0.333103))
+            | rubs("tustin", rest=(0.501325, 0.194777), rough=(0.103706, 0.103706), alpha=1859.76)
+            | course("power", 1.50143, 2.92213, phi=0.953257, omega=14.4442, e=0.71469)
+        )
         found = ringsweep.sweep(scene, {"time.span": [0.659132]}, progress=False)
         assert found.phi_end.item() == pytest.approx(1.83277839, abs=1e-8)
         assert found.impulse_max.item() == pytest.approx(146.67072, rel=1e-5)
@@ -658,16 +539,11 @@ class TestBody:
             "vb": 0.304904, "w": 0.0141684, "h": 0.558222,
             "rest": {"mu_s": 1.26286, "mu_k": 1.01809}, "rough": {"mu_s": 0.349284, "mu_k": 0.00191046},
         }  # fmt: skip
-        scene = {
-            "model": "ring",
-            "friction": friction,
-            "drive": {"law": "power", "amplitude": -11.0615, "exponent": 1.0},
-            "body": {"mass": 0.489069, "inertia": 7.10457e-05, "half_distance": 0.0238336, "ball_radius": 0.00874807},
-            "ring": {"radius": 0.0605306},
-            "zone": {"half_angle": 2.4754},
-            "initial": {"phi": 0.0, "omega": 18.6091},
-            "impact": {"restitution": 0.721582},
-        }
+        scene = (
+            shape(0.489069, 7.10457e-05, 0.0238336, 0.00874807, 0.0605306, zone=2.4754)
+            | course("power", -11.0615, 1.0, phi=0.0, omega=18.6091, e=0.721582)
+            | {"friction": friction}
+        )
         found = ringsweep.sweep(scene, {"time.span": [0.5]}, progress=False)
         assert ringsweep.words(found.regime).item() == "separating"
         assert found.separating_contact.item() == 1
@@ -694,16 +570,14 @@ class TestBody:
 
         How far depends neither on the speed of the ring nor on restitution: there is no impact.
         """
-        scene = BODY | {
-            "body": {"mass": 0.487588, "inertia": 0.0010535, "half_distance": 0.0651855, "ball_radius": 0.0287784},
-            "ring": {"radius": 0.0942658},
-            "friction": {
-                "law": "bengisu-akay", "alpha": 5762090.0, "v0": 8.05494e-09,
-                "rest": {"mu_s": 0.545811, "mu_k": 0.453534}, "rough": {"mu_s": 0.551256, "mu_k": 0.355862},
-            },
-            "zone": {"half_angle": 2.57735, "center": 2.15758},
-            "initial": {"phi": 1.36964, "omega": 0.0},
-        }  # fmt: skip
+        scene = (
+            BODY
+            | shape(0.487588, 0.0010535, 0.0651855, 0.0287784, 0.0942658, zone=(2.57735, 2.15758))
+            | rubs(
+                "bengisu-akay", rest=(0.545811, 0.453534), rough=(0.551256, 0.355862), alpha=5762090.0, v0=8.05494e-09
+            )
+            | {"initial": {"phi": 1.36964, "omega": 0.0}}
+        )
         axes = {"drive.amplitude": [0.6, 0.9, 1.2, 1.5], "impact.restitution": [0.0, 0.5, 1.0]}
         found = ringsweep.sweep(scene, axes, progress=False)
         assert found.gap_max.values.ravel() == pytest.approx(6.038e-4, abs=3e-7)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from rings import bump, course, rubs, shape
 from scipy.integrate import solve_ivp
 
 from benchmarks.reference import free, go_on, rattling
@@ -31,15 +32,12 @@ def particle(radius, **changes):
 
 
 def rig(mu=0.1, e=0.5, **changes):
-    return {
-        "model": "ring",
-        "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.010},
-        "ring": {"radius": 0.043378},
-        "friction": {"law": "stiction", "rest": {"mu_s": 2.0 * mu, "mu_k": mu}},
-        "drive": {"law": "none"},
-        "time": {"span": 1.0},
-        "impact": {"restitution": e},
-    } | changes
+    return (
+        shape(0.076, 4.47e-5, 0.025, 0.010, 0.043378)
+        | rubs("stiction", rest=(2.0 * mu, mu))
+        | course("none", span=1.0, e=e)
+        | changes
+    )
 
 
 def until(scene, t):
@@ -87,12 +85,12 @@ IN_TURN = [
 @pytest.mark.parametrize("numbers", IN_TURN)
 def test_body_that_rebounds_from_both_contacts_in_turn_comes_to_rest_on_both(numbers):
     mass, inertia, half, ball, radius, mu_s, mu_k, phi, omega, e, rests = numbers
-    scene = rig(e=e) | {
-        "body": {"mass": mass, "inertia": inertia, "half_distance": half, "ball_radius": ball},
-        "ring": {"radius": radius},
-        "friction": {"law": "stiction", "rest": {"mu_s": mu_s, "mu_k": mu_k}},
-        "initial": {"phi": phi, "omega": omega},
-    }
+    scene = (
+        rig(e=e)
+        | shape(mass, inertia, half, ball, radius)
+        | rubs("stiction", rest=(mu_s, mu_k))
+        | {"initial": {"phi": phi, "omega": omega}}
+    )
     found, _ = go_on(scene)
     assert (found["end"], found["closed"], found["speed"]) == (HELD, CLOSED, 0.0)
     # The row is cut off at a speed of 1e-6 m/s.
@@ -118,45 +116,34 @@ def energy(scene, found):
 
 
 #: The friction of this body rises steeply at a speed of 0.015 m/s.
-BUMP = {
-    "friction": {"law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
-                 "vb": 0.0150096, "w": 0.00037879, "h": 0.337113,
-                 "rest": {"mu_s": 1.17574, "mu_k": 0.830991}, "rough": {"mu_s": 0.648814, "mu_k": 0.597697}},
-    "drive": {"law": "power", "amplitude": 1.21617, "exponent": 1.05325},
-    "body": {"mass": 0.313781, "inertia": 0.000143466, "half_distance": 0.0270851, "ball_radius": 0.0190461},
-    "ring": {"radius": 0.0606886},
-    "zone": {"half_angle": 0.267026, "center": -1.78478},
-    "initial": {"phi": 1.17837, "omega": 0.0},
-}  # fmt: skip
+BUMP = (
+    shape(0.313781, 0.000143466, 0.0270851, 0.0190461, 0.0606886, zone=(0.267026, -1.78478))
+    | bump(rest=(1.17574, 0.830991), rough=(0.648814, 0.597697), vb=0.0150096, w=0.00037879, h=0.337113)
+    | course("power", 1.21617, 1.05325, phi=1.17837, omega=0.0)
+)
 
 
 #: Bodies at rest on rings whose acceleration is infinite at 0, and when a contact is lost.
 AT_ONCE = [
     # Left behind, caught up after 4e-13 s, and held until the falling acceleration unloads contact 1.
-    pytest.param({
-        "friction": {"law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
-                     "vb": 0.0591481, "w": 0.0036196, "h": -0.149709,
-                     "rest": {"mu_s": 0.628147, "mu_k": 0.275179}},
-        "drive": {"law": "power", "amplitude": 0.118852, "exponent": 1.75063},
-        "body": {"mass": 0.220058, "inertia": 1.29634e-06, "half_distance": 0.00313086, "ball_radius": 0.00909936,
-                 "center_offset": 0.00286972},
-        "ring": {"radius": 0.0313716},
-        "initial": {"phi": -0.778751, "omega": 0.0},
-    }, 1.49134405e-11, id="caught up"),
+    pytest.param(
+        shape(0.220058, 1.29634e-06, 0.00313086, 0.00909936, 0.0313716, offset=0.00286972)
+        | bump(rest=(0.628147, 0.275179), vb=0.0591481, w=0.0036196, h=-0.149709)
+        | course("power", 0.118852, 1.75063, phi=-0.778751, omega=0.0),
+        1.49134405e-11,
+        id="caught up",
+    ),
     # Left behind for good, although stick is admissible from 1e-10 s on. The time is that of SciPy's DOP853.
-    pytest.param({
-        "friction": {"law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
-                     "vb": 0.158546, "w": 0.0177405, "h": 0.0825207,
-                     "rest": {"mu_s": 0.33283, "mu_k": 0.0031922}, "rough": {"mu_s": 0.338215, "mu_k": 0.00402841}},
-        "drive": {"law": "power", "amplitude": -16.1635, "exponent": 1.90444},
-        "body": {"mass": 0.298869, "inertia": 0.000687997, "half_distance": 0.0394439, "ball_radius": 0.0258572},
-        "ring": {"radius": 0.0665151},
-        "zone": {"half_angle": 0.37743, "center": -2.53899},
-        "initial": {"phi": -0.00150168, "omega": 0.0},
-    }, 0.34350943534083, id="left behind"),
+    pytest.param(
+        shape(0.298869, 0.000687997, 0.0394439, 0.0258572, 0.0665151, zone=(0.37743, -2.53899))
+        | bump(rest=(0.33283, 0.0031922), rough=(0.338215, 0.00402841), vb=0.158546, w=0.0177405, h=0.0825207)
+        | course("power", -16.1635, 1.90444, phi=-0.00150168, omega=0.0),
+        0.34350943534083,
+        id="left behind",
+    ),
     # Left behind so fast that the ring passes a bump of friction at once, which unloads contact 2.
     pytest.param(BUMP, 3.61221169e-14, id="over a bump"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("scene", "lost"), AT_ONCE)
@@ -178,13 +165,12 @@ def test_rising_friction_takes_a_body_along_on_one_contact_before_it_jams(accele
 def test_body_that_is_wedged_on_one_contact_turns_as_its_accelerations_leave_it():
     """From rest, its angular velocity is to that of the ring as the accelerations of a body whose contact sticks."""
     mass, moment, half, ball, radius = 0.277488, 1.55222e-05, 0.0108799, 0.0174689, 0.0466026
-    scene = rig() | {
-        "body": {"mass": mass, "inertia": moment, "half_distance": half, "ball_radius": ball},
-        "ring": {"radius": radius},
-        "friction": {"law": "stiction", "rest": {"mu_s": 0.788576, "mu_k": 0.478072}},
-        "drive": {"law": "power", "amplitude": 11.2748, "exponent": 1.07766},
-        "initial": {"phi": 1.77461, "omega": 0.0},
-    }
+    scene = (
+        rig()
+        | shape(mass, moment, half, ball, radius)
+        | rubs("stiction", rest=(0.788576, 0.478072))
+        | course("power", 11.2748, 1.07766, phi=1.77461, omega=0.0)
+    )
     reach = radius - ball
     along = half * math.sqrt(reach**2 - half**2) / reach
     lever = ball + half**2 / reach
@@ -371,23 +357,11 @@ def test_the_woodpecker_pecks_with_the_published_period():
 
 
 # Hits one ball after the other in flight, then fifty times with one ball, and then with one while the other one holds.
-SHARED = {
-    "model": "ring",
-    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01, "center_offset": 0.0},
-    "ring": {"radius": 0.043378},
-    "friction": {
-        "law": "bengisu-akay",
-        "rest": {"mu_s": 0.105568, "mu_k": 0.105568},
-        "rough": {"mu_s": 0.585926, "mu_k": 0.190734},
-        "alpha": 819161.0,
-        "v0": 1.00596e-05,
-    },
-    "zone": {"half_angle": 0.00960347, "center": -2.4594},
-    "drive": {"law": "none"},
-    "initial": {"phi": 0.0, "omega": -103.221},
-    "impact": {"restitution": 0.848071},
-    "time": {"span": 0.72},
-}
+SHARED = (
+    shape(0.076, 4.47e-5, 0.025, 0.01, 0.043378, zone=(0.00960347, -2.4594))
+    | rubs("bengisu-akay", rest=(0.105568, 0.105568), rough=(0.585926, 0.190734), alpha=819161.0, v0=1.00596e-05)
+    | course("none", phi=0.0, omega=-103.221, span=0.72, e=0.848071)
+)
 
 
 def test_springs_that_hit_a_little_later_part_only_in_the_impact_that_both_contacts_share():

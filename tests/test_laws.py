@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from belts import on_belt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from solutions import made
@@ -469,14 +470,7 @@ class TestCharacteristicValues:
 
 def scene(law, **parameters):
     """A belt scene with parameters of its friction law."""
-    return {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 2.0},
-        "belt": {"velocity": 0.1},
-        "friction": {"law": law, "mu_s": MU_S, "mu_k": MU_K, **parameters},
-        "time": {"span": 1.0},
-    }
+    return on_belt({"law": law, "mu_s": MU_S, "mu_k": MU_K, **parameters}, 2.0, velocity=0.1, span=1.0)
 
 
 @pytest.mark.parametrize("law", ["piecewise-linear", "piecewise-cubic"])

@@ -10,6 +10,7 @@ where it jams they grow without bound.
 import numpy as np
 import pytest
 import xarray as xr
+from rings import course, rubs, shape
 from scipy.integrate import solve_ivp
 from solutions import rod
 
@@ -231,26 +232,11 @@ def test_body_sticks_on_where_the_determinant_vanishes_as_it_does_on_springs(ang
     xi = offset * R * np.cos(angle)
     body = rod(M, inertia * M * R**2, R, xi, np.sin(angle), np.cos(angle), g)
     w = 2.0 * np.pi * frequency
-    scene = {
-        "model": "ring",
-        "body": {
-            "mass": M,
-            "inertia": inertia * M * R**2,
-            "half_distance": R * np.sin(angle),
-            "ball_radius": 0.0,
-            "center_offset": xi - R * np.cos(angle),
-        },
-        "ring": {"radius": R},
-        "friction": {
-            "law": "stiction",
-            "rough": {"mu_s": mu_s[0], "mu_k": mu_s[0]},
-            "rest": {"mu_s": mu_s[1], "mu_k": mu_s[1]},
-        },
-        "zone": {"half_angle": 0.6, "center": -0.6},
-        "drive": {"law": "sinusoidal", "amplitude": -tilt, "frequency": frequency},
-        "initial": {"omega": -tilt * w},
-        "time": {"span": 4.9},
-    }
+    scene = (
+        shape(M, inertia * M * R**2, R * np.sin(angle), 0.0, R, offset=xi - R * np.cos(angle), zone=(0.6, -0.6))
+        | rubs("stiction", rest=(mu_s[1], mu_s[1]), rough=(mu_s[0], mu_s[0]))
+        | course("sinusoidal", -tilt, frequency, omega=-tilt * w, span=4.9)
+    )
     found = ringsweep.sweep(scene, {"drive.amplitude": [-tilt]}, progress=False)
     phi = found.phi_end.item()
     assert found.certified == 1
@@ -280,20 +266,11 @@ def test_wedged_body_is_taken_along_by_a_ring_that_starts_with_an_infinite_accel
 
     The time is that of ``benchmarks.reference``.
     """
-    scene = {
-        "model": "ring",
-        "body": {"mass": 0.0722696, "inertia": 5.11858e-4, "half_distance": 0.0668469, "ball_radius": 0.0247363},
-        "ring": {"radius": 0.0922752},
-        "friction": {
-            "law": "stiction",
-            "rest": {"mu_s": 0.221905, "mu_k": 0.221905},
-            "rough": {"mu_s": 0.588606, "mu_k": 0.424211},
-        },
-        "zone": {"half_angle": 2.07136, "center": np.pi},
-        "drive": {"law": "power", "amplitude": -1.86835, "exponent": 1.1375},
-        "initial": {"phi": 0.659025, "omega": 0.0},
-        "time": {"span": 2.75782},
-    }
+    scene = (
+        shape(0.0722696, 5.11858e-4, 0.0668469, 0.0247363, 0.0922752, zone=(2.07136, np.pi))
+        | rubs("stiction", rest=(0.221905, 0.221905), rough=(0.588606, 0.424211))
+        | course("power", -1.86835, 1.1375, phi=0.659025, omega=0.0, span=2.75782)
+    )
     found = ringsweep.sweep(scene, {"drive.exponent": [1.1375]}, progress=False)
     t = found.t_separation.item()
     assert t == pytest.approx(1.1534711829171995, rel=1e-12)

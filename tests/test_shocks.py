@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from belts import on_belt
 
 import ringsweep
 from ringsweep.models import MODELS
@@ -18,14 +19,7 @@ PARTICLE = {
     "initial": {"omega": "8 rad/s"},
     "time": {"span": "3 s"},
 }
-BELT = {
-    "model": "belt",
-    "body": {"mass": 1},
-    "spring": {"stiffness": 2},
-    "belt": {"velocity": 0.1},
-    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
-    "time": {"span": "60 s"},
-}
+BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2, velocity=0.1, span="60 s")
 
 
 def one(scene, **options):

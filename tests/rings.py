@@ -1,0 +1,35 @@
+"""Scenes of a body in a ring, each from one line of numbers (SI) for its shape, its friction and its course."""
+
+#: Names of the numbers of a drive behind its amplitude.
+_NUMBERS = {"power": ("exponent",), "sinusoidal": ("frequency", "phase")}
+
+
+def _without(given):
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def shape(mass, inertia, half_distance, ball_radius, radius, *, offset=None, zone=None):
+    """Body with two balls, ring, and a zone: its half-angle, or half-angle and center."""
+    body = {"mass": mass, "inertia": inertia, "half_distance": half_distance, "ball_radius": ball_radius}
+    half_angle, center = zone if isinstance(zone, tuple) else (zone, None)
+    arc = _without({"half_angle": half_angle, "center": center})
+    parts = {"model": "ring", "body": body | _without({"center_offset": offset}), "ring": {"radius": radius}}
+    return parts | ({"zone": arc} if arc else {})
+
+
+def rubs(law, rest, rough=None, **parameters):
+    """Friction law with pairs of a static and a kinetic coefficient."""
+    pairs = {place: {"mu_s": pair[0], "mu_k": pair[1]} for place, pair in (("rest", rest), ("rough", rough)) if pair}
+    return {"friction": {"law": law, **parameters, **pairs}}
+
+
+def bump(rest, rough=None, *, vb, w, h):
+    """Friction with a bump of the height h and the width w at the speed vb."""
+    return rubs("formula", rest, rough, mu="mu_k + h*exp(-((v - vb)/w)**2)", at_rest="mu_s", vb=vb, w=w, h=h)
+
+
+def course(drive, *numbers, phi=None, omega=None, span=None, e=None):
+    """Drive with its numbers, launch, span and restitution."""
+    driven = {"law": drive, **dict(zip(("amplitude", *_NUMBERS.get(drive, ())), numbers, strict=False))}
+    parts = {"drive": driven, "initial": _without({"phi": phi, "omega": omega}), "time": _without({"span": span})}
+    return {name: part for name, part in parts.items() if part} | ({} if e is None else {"impact": {"restitution": e}})
