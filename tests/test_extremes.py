@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from belts import on_belt, with_all_parts
+from rings import course, rubs, shape
 from tiers import mostly_slow
 
 import ringsweep
@@ -119,15 +120,11 @@ class TestForce:
         assert abs(run.force_max - greatest * G) <= run.force_max_error
 
 
-RING = {
-    "model": "ring",
-    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
-    "ring": {"radius": 0.043378},
-    "friction": {"law": "bengisu-akay", "rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}},
-    "zone": {"half_angle": "15 deg"},
-    "drive": {"law": "arctan", "amplitude": 0.4},
-    "time": {"span": 4.0},
-}
+RING = (
+    shape(0.076, 4.47e-5, 0.025, 0.01, 0.043378, zone="15 deg")
+    | rubs("bengisu-akay", rest=(0.2, 0.1), rough=(0.5, 0.3))
+    | course("arctan", 0.4, span=4.0)
+)
 
 
 class TestReactions:

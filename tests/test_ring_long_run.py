@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
+from rings import course, rubs, shape
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -27,16 +28,11 @@ ROCKING = {
 }
 
 #: Two balls on a rod, on a ring that rocks.
-RIG = {
-    "model": "ring",
-    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
-    "ring": {"radius": 0.043378},
-    "friction": {"law": "stiction", "rest": {"mu_s": 0.2, "mu_k": 0.1}, "rough": {"mu_s": 0.5, "mu_k": 0.3}},
-    "zone": {"half_angle": 0.26},
-    "drive": {"law": "sinusoidal", "amplitude": 0.6, "frequency": 1.3},
-    "initial": {"phi": 0.3, "omega": 0.0},
-    "time": {"span": 60.0 / 1.3},
-}
+RIG = (
+    shape(0.076, 4.47e-5, 0.025, 0.01, 0.043378, zone=0.26)
+    | rubs("stiction", rest=(0.2, 0.1), rough=(0.5, 0.3))
+    | course("sinusoidal", 0.6, 1.3, phi=0.3, omega=0.0, span=60.0 / 1.3)
+)
 
 LUGRE = {"law": "lugre", "sigma0": 2000.0, "sigma1": 5.0, "sigma2": 0.0, "v_s": 0.01}
 
