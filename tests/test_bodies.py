@@ -1,6 +1,7 @@
 """Bodies that are declared by their balances, against solutions that do not use what is derived from them."""
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,69 +18,28 @@ from ringsweep.physics import contact, ring
 ENERGY = "mass*radius*(0.5*radius*omega**2 - pull*cos_phi)"
 
 
-class OnFeet(NamedTuple):
-    """A body on two feet, whose friction acts at heights of their own below the centre of mass."""
-
-    mass: Any
-    radius: Any
-    gravity: Any
-    press: Any
-    pull: Any
-    half: Any
-    height_1: Any
-    height_2: Any
-    constants: tuple[Any, ...] = ()
+ALONG = "mass*radius*phi_dd = K1*N1 + K2*N2 - mass*pull*sin_phi"
 
 
-ring.body(
-    balances=(
-        "N1 + N2 = mass*press",
-        "half*(N1 - N2) = -(height_1*K1*N1 + height_2*K2*N2)",
-        "mass*radius*phi_dd = K1*N1 + K2*N2 - mass*pull*sin_phi",
-    ),
-    energy=ENERGY,
-)(OnFeet)
+def declared(name: str, fields: str, *balances: str) -> Any:
+    """A body with a mass, a radius, gravity, a load and a pull, and further fields."""
+    names = f"mass radius gravity press pull {fields} constants"
+    # typing.NamedTuple takes no defaults where it is called.
+    made = namedtuple(name, names, defaults=((),))  # noqa: PYI024
+    return ring.body(balances=balances, energy=ENERGY)(made)
 
 
-class Brake(NamedTuple):
-    """Two shoes of a brake: friction of each one presses the other one on."""
+#: A body on two feet, whose friction acts at heights of their own below the centre of mass.
+OnFeet = declared(
+    "OnFeet", "half height_1 height_2",
+    "N1 + N2 = mass*press", "half*(N1 - N2) = -(height_1*K1*N1 + height_2*K2*N2)", ALONG,
+)  # fmt: skip
 
-    mass: Any
-    radius: Any
-    gravity: Any
-    press: Any
-    pull: Any
-    onto_1: Any
-    onto_2: Any
-    constants: tuple[Any, ...] = ()
+#: Two shoes of a brake: friction of each one presses the other one on.
+Brake = declared("Brake", "onto_1 onto_2", "N1 = mass*press + onto_1*K2*N2", "N2 = mass*press + onto_2*K1*N1", ALONG)
 
-
-ring.body(
-    balances=(
-        "N1 = mass*press + onto_1*K2*N2",
-        "N2 = mass*press + onto_2*K1*N1",
-        "mass*radius*phi_dd = K1*N1 + K2*N2 - mass*pull*sin_phi",
-    ),
-    energy=ENERGY,
-)(Brake)
-
-
-class Sledge(NamedTuple):
-    """A body on one contact, whose friction presses it on or lifts it."""
-
-    mass: Any
-    radius: Any
-    gravity: Any
-    press: Any
-    pull: Any
-    lift: Any
-    constants: tuple[Any, ...] = ()
-
-
-ring.body(
-    balances=("N1 = mass*press + lift*K1*N1", "mass*radius*phi_dd = K1*N1 - mass*pull*sin_phi"),
-    energy=ENERGY,
-)(Sledge)
+#: A body on one contact, whose friction presses it on or lifts it.
+Sledge = declared("Sledge", "lift", "N1 = mass*press + lift*K1*N1", "mass*radius*phi_dd = K1*N1 - mass*pull*sin_phi")
 
 
 FIELDS = [(name, Any) for name in ring.TwoContacts._fields if name != "constants"]
@@ -210,19 +170,11 @@ class TestDeclaration:
             ring.completed(twice(1.0, 1.0, 9.81, 10.0, 5.0, 0.0, 0.0, ()))
 
     def test_balances_that_do_not_determine_a_reaction_are_refused(self):
-        class Loose(NamedTuple):
-            mass: Any
-            radius: Any
-            gravity: Any
-            share: Any
-            pull: Any
-            constants: tuple[Any, ...] = ()
-
-        balances = "share*N1 = mass*gravity", "mass*radius*phi_dd = K1*N1 - mass*pull*sin_phi"
-        ring.body(balances=balances, energy=ENERGY)(Loose)
-        ring.completed(Loose(1.0, 1.0, 9.81, 1e-9, 5.0))
+        along = "mass*radius*phi_dd = K1*N1 - mass*pull*sin_phi"
+        loose = declared("Loose", "share", "share*N1 = mass*gravity", along)
+        ring.completed(loose(1.0, 1.0, 9.81, 0.0, 5.0, 1e-9))
         with pytest.raises(ValueError, match="do not determine phi_dd and the reactions for these numbers"):
-            ring.completed(Loose(1.0, 1.0, 9.81, np.array([0.5, 0.0]), 5.0))
+            ring.completed(loose(1.0, 1.0, 9.81, 0.0, 5.0, np.array([0.5, 0.0])))
 
     @pytest.mark.parametrize(
         ("balances", "offset", "message"),

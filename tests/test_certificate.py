@@ -80,44 +80,17 @@ class TestDips:
 class TestContactProblem:
     def test_stuck_body_with_one_contact_on_a_rough_arc_is_not_jammed(self, cells):
         """Slip at mu_s of the zone would jam, but the body does not slip."""
-        found = solve(
-            Auto(),
-            cells(
-                {
-                    "body.inertia": 5e-6,
-                    "body.half_distance": 0.010,
-                    "body.ball_radius": 0.005,
-                    "ring.radius": 0.065,
-                    "zone.half_angle": np.radians(30),
-                    "zone.center": np.radians(30),
-                    **dict(zip(COEFFICIENTS, (0.55, 0.3, 0.1, 0.08), strict=True)),
-                    "time.span": 5.0,
-                },
-                law="stiction",
-                drive="arctan",
-            ),
-        )
+        values = dict(zip(COEFFICIENTS, (0.55, 0.3, 0.1, 0.08), strict=True)) | {"time.span": 5.0, "ring.radius": 0.065}
+        values |= {"body.inertia": 5e-6, "body.half_distance": 0.010, "body.ball_radius": 0.005}
+        values |= dict.fromkeys(("zone.half_angle", "zone.center"), np.radians(30))
+        found = solve(Auto(), cells(values, law="stiction", drive="arctan"))
         assert (found.regime, found.certified, found.stick_time) == (RESTING, 1, 5.0)
 
     def test_slip_with_a_negative_reaction_is_not_admissible(self, cells):
         """Stick is the only admissible mode: its saturation is 0.465, and both reactions are positive."""
-        found = solve(
-            Auto(),
-            cells(
-                {
-                    "body.mass": 0.15,
-                    "body.inertia": 8e-5,
-                    "body.half_distance": 0.036,
-                    "ring.radius": 0.050,
-                    "initial.phi": 1.34,
-                    "zone.half_angle": 0.0,
-                    **dict.fromkeys(COEFFICIENTS, 0.66),
-                    "time.span": 2.0,
-                },
-                law="stiction",
-                drive="arctan",
-            ),
-        )
+        values = dict.fromkeys(COEFFICIENTS, 0.66) | {"body.mass": 0.15, "body.inertia": 8e-5}
+        values |= {"body.half_distance": 0.036, "ring.radius": 0.050, "initial.phi": 1.34, "zone.half_angle": 0.0}
+        found = solve(Auto(), cells(values | {"time.span": 2.0}, law="stiction", drive="arctan"))
         assert (found.regime, found.certified) == (RESTING, 1)
         assert found.normal_min_1 == pytest.approx(1.489, abs=1e-3)
         assert found.normal_min_2 == pytest.approx(0.139, abs=1e-3)
