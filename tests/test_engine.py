@@ -69,6 +69,16 @@ class TestAxes:
             for name in alone.data_vars:
                 np.testing.assert_array_equal(alone[name], grid[name][i, j])
 
+    def test_sweep_takes_scene_and_solver_of_a_whole_configuration(self, scene, grid):
+        whole = {"scene": scene, "solver": {"method": "event", "rtol": 1e-9}, "sweep": {"grid": {"time.span": [1, 2]}}}
+        found = ringsweep.sweep(whole, {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS})
+        assert json.loads(found.attrs["solver"])["rtol"] == 1e-9
+        np.testing.assert_array_equal(found.regime, grid.regime)
+
+    def test_simulate_sets_values_by_their_paths(self, scene, grid):
+        run = ringsweep.simulate(scene, set={"drive.amplitude": AMPLITUDES[2], "zone.half_angle": WIDTHS[0]})
+        assert float(run.t_end) == float(grid.t_end[2, 0])
+
     def test_number_of_threads_does_not_change_results(self, scene, grid):
         serial = ringsweep.sweep(scene, {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS}, jobs=1)
         xr.testing.assert_equal(serial, grid)

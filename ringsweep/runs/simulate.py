@@ -33,6 +33,7 @@ SAMPLES = 20_000
 def simulate(
     scene: str | os.PathLike[str] | Mapping[str, Any],
     *,
+    set: Mapping[str, Any] | None = None,  # noqa: A002  as --set
     solver: str | Mapping[str, Any] | None = None,
     samples: int = SAMPLES,
 ) -> xr.Dataset:
@@ -43,6 +44,8 @@ def simulate(
     scene : mapping or path
         The mapping under ``scene`` in a configuration, or a whole configuration, or the path of one. Axes other than
         a grid axis of friction laws are ignored.
+    set : mapping of str to number or str, optional
+        Values that replace those of the scene, by path, such as ``{"drive.amplitude": 4}``.
     solver : str or mapping, optional
         Name of a method, or the mapping under ``solver`` in a configuration; by default the solver of the
         configuration.
@@ -83,19 +86,21 @@ def simulate(
     >>> run.x.max().round(6).item()
     0.74574
     """
-    return history(_single_run(scene, solver), samples=samples)
+    return history(_single_run(scene, set or {}, solver), samples=samples)
 
 
-def _single_run(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str | Mapping[str, Any] | None) -> Config:
+def _single_run(
+    scene: str | os.PathLike[str] | Mapping[str, Any],
+    changed: Mapping[str, Any],
+    solver: str | Mapping[str, Any] | None,
+) -> Config:
     """Configuration of a single run from a scene or a whole configuration."""
     if isinstance(scene, xr.Dataset):
         cure = "ds.ringsweep.simulate(drive_amplitude=2) runs a cell of it, ringsweep.plots.cell names the cell"
         raise InputError("scene", f"a configuration is expected, got a dataset: {cure}")
     if isinstance(scene, Mapping) and "scene" not in scene:
         scene = {"scene": scene}
-    if solver is None:
-        return with_values(scene)
-    return with_values(scene, solver={"method": solver} if isinstance(solver, str) else solver)
+    return with_values(scene, changed.items(), {"method": solver} if isinstance(solver, str) else solver)
 
 
 def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:

@@ -143,11 +143,11 @@ def _run(
 
 
 def sweep(
-    scene: Mapping[str, Any],
+    scene: str | os.PathLike[str] | Mapping[str, Any],
     axes: Mapping[str, Any] | pd.DataFrame,
     output: str | os.PathLike[str] | None = None,
     *,
-    solver: str | Mapping[str, Any] = "auto",
+    solver: str | Mapping[str, Any] | None = None,
     jobs: int | None = None,
     fresh: bool = False,
     reuse: str | os.PathLike[str] | None = None,
@@ -161,16 +161,18 @@ def sweep(
 
     Parameters
     ----------
-    scene : mapping
-        The mapping under ``scene`` in a configuration.
+    scene : mapping or path
+        The mapping under ``scene`` in a configuration, or a whole configuration, or the path of one. Then ``axes`` take
+        the place of its sweep.
     axes : mapping of str to sequence or xarray.DataArray, or pandas.DataFrame
         Values for paths of the scene, such as ``"drive.amplitude"``, or names for ``"friction.law"``.
         A 1-D sequence is a grid axis. DataArrays that share a dimension vary together along it. Each row of a DataFrame
         is a run: its columns are paths, which vary together along the dimension ``point``.
-    solver : str or mapping
-        Name of a method, or the mapping under ``solver`` in a configuration.
+    solver : str or mapping, optional
+        Name of a method, or the mapping under ``solver`` in a configuration; by default that of the configuration, else
+        ``"auto"``.
     record, follow : mapping, optional
-        The mappings under ``record`` and ``sweep.follow`` in a configuration.
+        The mappings under ``record`` (by default that of the configuration) and ``sweep.follow``.
     output, jobs, fresh, reuse, refine, scheduler, progress
         As for :func:`run`.
 
@@ -204,13 +206,18 @@ def sweep(
     """
     if hasattr(axes, "itertuples"):
         axes = {str(path): xr.DataArray(column.to_numpy(), dims="point") for path, column in axes.items()}
-    parsed = read_scene(scene, axes, record)
+    given: Any = scene
+    is_whole = isinstance(given, str | os.PathLike) or (isinstance(given, Mapping) and "scene" in given)
+    whole: Mapping[str, Any] = load(given).source if is_whole else {"scene": given}
+    record = whole.get("record") if record is None else record
+    solver = whole.get("solver", "auto") if solver is None else solver
+    parsed = read_scene(whole["scene"], axes, record)
     found = read_axes(parsed, axes)
     method = read_solver(solver, parsed)
-    given = {"method": solver} if isinstance(solver, str) else dict(solver)
+    of_method = {"method": solver} if isinstance(solver, str) else dict(solver)
     also = {key: value for key, value in (("follow", follow), ("refine", refine)) if value not in (None, False)}
     section = _sweep_section(found) | read(also).tree
-    source = {"scene": dict(parsed.source), "solver": given, "sweep": section}
+    source = {"scene": dict(parsed.source), "solver": of_method, "sweep": section}
     if record is not None:
         source["record"] = dict(record)
     config = assembled(Config(parsed, method, found, source, name="ringsweep"))
