@@ -20,6 +20,7 @@ from ringsweep.numerics.series import (
     value,
     variation,
 )
+from ringsweep.numerics.swing import swing
 from ringsweep.numerics.terms import COLUMNS, FACTOR_ROWS, PRODUCTS, inner_products, no_factors, set_factors
 
 K = np.arange(ORDER + 1)
@@ -66,6 +67,12 @@ def roots_in_kernel(rows, h, work, roots):
     """Fill `roots` with the first root of each series, or with `h`."""
     for i in range(len(roots)):
         roots[i] = first_root(rows[i], h, work)[0]
+
+
+@kernel
+def swing_in_kernel(rows, factors):
+    """Fill rows 0 to 3 with the series of a swing, see `swing`."""
+    swing(rows[0], rows[1], rows[2], rows[3], (factors[0], factors[1], factors[2], factors[3], factors[4]))
 
 
 @kernel
@@ -277,3 +284,21 @@ def test_kernels_and_python_find_the_same_first_roots():
     expected = np.array([first(row, 1.0)[0] for row in rows])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert 20 < (found == 1.0).sum() < 180
+
+
+@pytest.mark.parametrize("fill", [swing_in_kernel, swing_in_kernel.py_func], ids=["kernel", "python"])
+def test_series_of_a_swing_obey_its_equation_and_a_pendulum_keeps_its_energy(fill):
+    factors = np.array([0.3, -1.1, 0.4, 0.2, 0.1])
+    for pendulum in (False, True):
+        rows = np.zeros((4, COLUMNS))
+        rows[:3, 0] = 0.7, np.sin(0.5), np.cos(0.5)
+        fill(rows, np.array([0.0, -1.0, 0.0, 0.0, 0.0]) if pendulum else factors)
+        omega, sine, cosine, square = rows[:, : ORDER + 1]
+        np.testing.assert_allclose(np.convolve(omega, omega)[: ORDER + 1], square, atol=1e-14)
+        np.testing.assert_allclose(np.convolve(omega, cosine)[:ORDER], K[1:] * sine[1:], atol=1e-14)
+        if pendulum:
+            np.testing.assert_allclose((0.5 * square - cosine)[1:], 0.0, atol=1e-15)
+        else:
+            acceleration = np.tensordot(factors[1:], [sine, cosine, omega, square], 1)
+            acceleration[0] += factors[0]
+            np.testing.assert_allclose(acceleration[:-1], K[1:] * omega[1:], atol=1e-14)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import cos, inf, isnan, sin
 from typing import NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.compile import absorbed, hook, inlined, specialise
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
@@ -39,12 +39,15 @@ from ringsweep.numerics.series import (
     step_within,
     value,
 )
+from ringsweep.numerics.swing import swing
 from ringsweep.numerics.terms import (
     FACTOR_ROWS,
     MOST_GROUPS,
+    NUMBERS,
     inner_products,
     joined,
     no_factors,
+    numbers_from,
     part_from,
     set_factors,
     set_terms,
@@ -55,6 +58,7 @@ from ringsweep.physics.friction.velocity import (
     KINETIC,
     begin_series,
     friction_in,
+    is_varying,
     no_products,
     region_at,
     region_bounds,
@@ -71,6 +75,9 @@ PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPARE = range(9)
 FACTORS = 9
 _GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
 DETERMINANT, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(_GUARDS, _GUARDS + 6)
+
+# Numbers behind those of the powers of a series, and zeros.
+_SECOND, _NONE = NUMBERS + 1.0, 0.0 * NUMBERS
 
 # If one reaction vanishes and the other is smaller than this share of the load, both contacts separate.
 _AT_ONCE = 1e-9
@@ -389,7 +396,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     if mode.sign == 0:
         return _expand_stick(scene, mode, tolerance, c)
     c[OMEGA, 0] = ring.angular_velocity(scene.body, y[1], c[THETA, 1])
-    sharpness = _expand_slip(scene, mode, c)
+    sharpness = _expand_slip(scene.law, scene, mode, c)
     _expand_slip_guards(scene, mode, c)
     per_angle = 1.0 / tolerance
     per_velocity = per_angle / speed_in(scene, mode, scene.body.radius * (rate_at_rest(scene) + abs(c[OMEGA, 0])))
@@ -406,9 +413,14 @@ def _expand(scene, mode, t, y, tolerance, c):
     return shorten_for_decay(sharpness, c[V], h)
 
 
+def _expand_slip(law, scene, mode, c):
+    """Fill the series of slip and return the sharpness of the friction law."""
+    return _slip_under(type(law))(law, scene, mode, c)
+
+
 @inlined
-def _expand_slip(scene, mode, c):
-    """Fill the series of slip and return the sharpness of the friction law.
+def _expand_slip_of_varying_friction(law, scene, mode, c):
+    """As :func:`_expand_slip`, if friction depends on the sliding velocity.
 
     Each coefficient is computed from numbers that are still in registers; the table only keeps it.
     """
@@ -456,6 +468,34 @@ def _expand_slip(scene, mode, c):
     least = LEAST_DETERMINANT * ring.free_determinant(body) if varies(scene.law, mode.region) else 0.0
     c[DETERMINANT, 0] = ring.determinant_terms(body, 1.0, K1_0, K2_0, K1_0 * K2_0) - least
     return sharpness
+
+
+@inlined
+def _expand_slip_of_constant_friction(law, scene, mode, c):
+    """As :func:`_expand_slip`, if friction does not depend on the sliding velocity."""
+    body, sign = scene.body, float(mode.sign)
+    mu_1, mu_2, _, _ = friction_in(law, mode.region, sign * c[V, 0], coefficients_under(scene, mode))
+    K1, K2 = -sign * mu_1, -sign * mu_2
+    acceleration, reaction_1, reaction_2 = ring.slip_balance(body, K1, K2)
+    c[SIN, 0], c[COS, 0] = sin(c[PHI, 0]), cos(c[PHI, 0])
+    swing(c[OMEGA], c[SIN], c[COS], c[SQUARE], acceleration[:5])
+    motion = c[SIN, 0], c[COS, 0], c[OMEGA, 0], c[SQUARE, 0]
+    sine, cosine, omega, square = terms(c[SIN]), terms(c[COS]), terms(c[OMEGA]), terms(c[SQUARE])
+    for row, balance in ((EPSILON, acceleration), (NORMAL_1, reaction_1), (NORMAL_2, reaction_2)):
+        c[row, 0] = _constant_term(balance, *motion)
+        set_terms(c[row], sine * balance[1] + cosine * balance[2] + omega * balance[3] + square * balance[4])
+    set_terms(c[PHI], numbers_from(c[OMEGA], 0) * numbers_from(INVERSE, 1))
+    set_terms(c[V], (omega - numbers_from(c[THETA], 2) * numbers_from(_SECOND, 0)) * body.radius)
+    c[DETERMINANT, 0] = ring.determinant_terms(body, 1.0, K1, K2, K1 * K2)
+    set_terms(c[DETERMINANT], numbers_from(_NONE, 0))
+    return 0.0
+
+
+def _slip_under(law):
+    return _expand_slip_of_varying_friction if is_varying(law) else _expand_slip_of_constant_friction
+
+
+specialise(_expand_slip, lambda law, *others: _slip_under(law))
 
 
 @inlined

@@ -282,6 +282,11 @@ def varies(expression, count, lanes, law, region):
     return ["low = low_of(law, region)", *writer.varies_lines(expression.mu, _REGION_SIDE)]
 
 
+def is_varying(law: Any) -> bool:
+    """Whether friction depends on the sliding speed in some region, by the type of a law or by Numba's type of it."""
+    return EXPRESSIONS[getattr(law, "instance_class", law)].mu.varies
+
+
 # ---- values -----------------------------------------------------------------------------------
 
 
