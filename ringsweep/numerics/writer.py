@@ -288,8 +288,11 @@ class _Step(_Writer):
 def series_source(names: Mapping[str, str], outputs: list[Node], side: str) -> SeriesSource:
     """Source code for the power series of expressions; see :func:`float_lines` for the arguments."""
     step = _Step(names)
-    _series(step, outputs, side)
-    head = ["(" + "".join(f"{name}, " for name in step.needed.values()) + ") = begun"] if step.needed else []
+    # Which side of a switch holds is found once, and not for each coefficient.
+    sides = {node.value: f"is_below_{node.value}" for node in nodes_of(*outputs) if node.kind == "switch"}
+    _series(step, outputs, "is_below_{}")
+    kept = [*step.needed.values(), *sides.values()]
+    head = ["(" + "".join(f"{name}, " for name in kept) + ") = begun"] if kept else []
     head += [f"l{i} = r{i} = 0.0" for i in range(step.products)]
     coefficients = "".join(f"{step.known.get(output, '0.0')}, " for output in outputs)
     left, right = ("".join(f"{s}{i}, " for i in range(step.products)) for s in "lr")
@@ -302,7 +305,9 @@ def series_source(names: Mapping[str, str], outputs: list[Node], side: str) -> S
         start.write(f"{name} = {start.known[node] if what == 'value' and not node.varies else '0.0'}")
     _begin(start, step, outputs, side)
     values = "".join(f"{start.known[output]}, " for output in outputs)
-    start.write(f"return ({values}), ({''.join(f'{name}, ' for name in step.needed.values())}), sharpness")
+    for threshold, name in sides.items():
+        start.write(f"{name} = {side.format(threshold)}")
+    start.write(f"return ({values}), ({''.join(f'{name}, ' for name in kept)}), sharpness")
     return SeriesSource(start.lines, step_lines, step.products)
 
 
@@ -551,16 +556,17 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, f
         choices = (f"{writer.known[p]} if k == {j + lag} else " for j, p in enumerate(coefficients[node]))
         return "(" + "".join(choices) + "0.0)"
 
-    def product(left: Node, right: Node, first: int, scale: str = "") -> str:
-        """Coefficient k of a product, with the coefficients of the left factor from `first` on."""
+    def product(left: Node, right: Node, first: int, scale: str = "", sign: str = "+") -> str:
+        """Coefficient k of a product, with the coefficients of the left factor from `first` on; or less each term."""
         if left in place:
             stored.update((place[left], place[right]))
             writer.write("total = 0.0")
             with writer.block(f"for j in range({first}, k + 1):"):
                 writer.write(f"total += work[{place[left]}, j] * work[{place[right]}, k - j]")
             return "total" + scale
+        # The newest coefficient comes last, so that the next one waits for one multiplication and addition.
         terms = list(enumerate(coefficients[left]))[first:]
-        return " + ".join(f"{writer.known[p]}{scale} * {row(right, j)}" for j, p in terms)
+        return f" {sign} ".join(f"{writer.known[p]}{scale} * {row(right, j)}" for j, p in reversed(terms))
 
     writer.write(f"factor = {factor}")
     inverses = {node: writer.new(f"1.0 / {writer.known[node.parts[1]]}") for node in place if node.kind == "divide"}
@@ -579,7 +585,7 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, f
             elif node.kind == "divide":
                 # Each factor on coefficients before is known before the loop, which waits for nothing else.
                 dividend = f"{term(p[0], 0)} * {inverses[node]} " if p[0].varies else ""
-                text = f"{dividend}- ({product(p[1], node, 1, f' * {inverses[node]}')})"
+                text = f"{dividend}- {product(p[1], node, 1, f' * {inverses[node]}', '-')}"
             elif node.kind == "switch":
                 text = f"{term(p[0], 0)} if {side.format(node.value)} else {term(p[1], 0)}"
             else:
