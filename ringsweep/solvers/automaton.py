@@ -87,7 +87,7 @@ class Run(NamedTuple):
     local: LocalErrors
 
 
-@hook
+@hook(absorb=True)
 def _step(family, scene, run, h_max, tolerances, scratch):
     """One step of the kind that the family of the friction law needs.
 
@@ -166,7 +166,7 @@ def _step_implicit(family, scene, run, h_max, tolerances, scratch):
     return True, guard, s, y, record, control, _after_creep(run.local, error)
 
 
-@hook(optional=True)
+@hook(absorb=True, optional=True)
 def _step_in(kind, scene, run, h_max, tolerances, scratch):
     """One step of a scene, or of the simpler scene whose mode it is in; arguments and result as for :func:`_step`."""
     return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
