@@ -79,12 +79,12 @@ def step_size(last, previous):
     last, previous : float
         Magnitudes of the coefficients of the powers ORDER and ORDER - 1, each divided by the tolerance.
     """
-    h = inf
+    steepness = -inf
     if last > 0.0:
-        h = exp(-log(last) / ORDER)
+        steepness = log(last) / ORDER
     if previous > 0.0:
-        h = min(h, exp(-log(previous) / (ORDER - 1)))
-    return h
+        steepness = max(steepness, log(previous) / (ORDER - 1))
+    return exp(-steepness)
 
 
 @inlined
