@@ -103,7 +103,7 @@ class TestWhatTheDataDoNotTell:
     @pytest.mark.slow
     def test_mass_and_stiffness_move_the_body_only_by_their_ratio(self):
         """Friction is proportional to the mass, so x'' = -(k/m) x + mu g."""
-        found = ringsweep.fit(BELT, measured(BELT, "x", T, 0.002, 3), "body.mass, spring.stiffness", start=2)
+        found = ringsweep.fit(BELT, measured(BELT, "x", T, 0.002, 3), ["body.mass", "spring.stiffness"], start=2)
         mass, stiffness = (found.best_values[name] for name in ("body_mass", "spring_stiffness"))
         assert stiffness / mass == pytest.approx(2.0, rel=1e-2)
         assert not found.errorbars or found.params["body_mass"].correl["spring_stiffness"] > 0.999

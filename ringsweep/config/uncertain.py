@@ -174,7 +174,7 @@ class Sample:
         return found
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=2)
 def _shares(method: str, size: int, factors: int, seed: int, replicates: int, sensitivity: bool) -> NDArray[np.float64]:
     drawn = factors * (2 if sensitivity else 1)
     points = np.concatenate([unit_points(method, size, drawn, seed, replicate) for replicate in range(replicates)])
@@ -393,9 +393,8 @@ def _survival(given: Any, scene: Scene) -> tuple[float, ...]:
         return ()
     time = Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
     where = "sweep.sample.survival"
-    if isinstance(given, dict):
-        return tuple(np.unique(read_spacing(given, time, where)).tolist())
-    return tuple(np.unique(read_values(given, time, where)).tolist())
+    read = read_spacing if isinstance(given, dict) else read_values
+    return tuple(np.unique(read(given, time, where)).tolist())
 
 
 def _check_points(sample: Sample, scene: Scene, axes: Axes) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +52,7 @@ _RATES = {"phi": "omega", "omega": "epsilon", "x": "velocity"}
 def fit(
     config: str | os.PathLike[str] | Mapping[str, Any] | xr.Dataset,
     data: Any,
-    vary: str | Mapping[str, Any],
+    vary: str | Sequence[str] | Mapping[str, Any],
     *,
     start: int = 8,
     noise: Any = None,
@@ -69,7 +69,7 @@ def fit(
     data : path, mapping or DataFrame
         Measured history: a column ``t`` (s), and one of a quantity of the history, such as ``phi`` or ``x``. A file is
         a CSV file with these names in its first line, with units in brackets: ``phi (deg)``.
-    vary : str or mapping
+    vary : str, sequence of str, or mapping
         Paths of the numbers to fit, separated by commas. ``path=low..high`` is where starts are looked for; by default
         where the configuration sweeps the path, else from half to twice the value of the scene. In a mapping, pairs of
         values, or None. A fit may leave this range, but not the values that the scene allows.
@@ -215,6 +215,8 @@ def _measurements(config: Config, doc: Document, data: Any) -> tuple[str, Floats
 
 def _ranges(config: Config, vary: Any) -> dict[str, tuple[float, float]]:
     """Where starts are looked for, by path."""
+    if isinstance(vary, list | tuple):
+        vary = ",".join(map(str, vary))
     if isinstance(vary, str):
         parts = ([piece.strip() for piece in part.partition("=")] for part in vary.split(","))
         vary = {path: ends.split("..") if equals else None for path, equals, ends in parts if path}
