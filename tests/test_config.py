@@ -5,6 +5,7 @@ import copy
 import json
 import math
 import os
+from functools import reduce
 from itertools import pairwise
 from pathlib import Path
 from threading import Thread
@@ -66,13 +67,10 @@ def edited(**changes):
     scene = copy.deepcopy(SCENE)
     for path, value in changes.items():
         *parents, last = path.split("__")
-        node = scene
-        for key in parents:
-            node = node.setdefault(key, {})
+        node = reduce(lambda node, key: node.setdefault(key, {}), parents, scene)
+        node[last] = value
         if value is None:
             del node[last]
-        else:
-            node[last] = value
     return scene
 
 
@@ -123,22 +121,19 @@ def test_example_is_read_in_si_units_and_its_source_is_json_that_reads_the_same(
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "unit", "expected"),
-    [
-        ("4.47e-5 kg m^2", "kg m^2", 4.47e-5),
-        ("4.47e-5 kg*m**2", "kg m^2", 4.47e-5),
-        ("447 g cm^2", "kg m^2", 4.47e-5),
-        ("43.378 mm", "m", 0.043378),
-        ("15deg", "rad", math.pi / 12),
-        ("30 rpm", "rad/s", math.pi),
-        ("3 rad s-1", "rad/s", 3.0),
-        ("2e-6 m/s", "m/s", 2e-6),
-        ("30 %", "1", 0.3),
-        ("-1.5", "m", -1.5),
-        (np.float32(0.5), "m", 0.5),
-    ],
-)
+#: Numbers with units as text, the unit of a parameter, and the number in that; then those that pint writes too.
+TEXTS = [
+    *(("4.47e-5 kg m^2", "kg m^2", 4.47e-5), ("15deg", "rad", math.pi / 12), ("3 rad s-1", "rad/s", 3.0)),
+    *(("30 %", "1", 0.3), ("-1.5", "m", -1.5), (np.float32(0.5), "m", 0.5)),
+]
+QUANTITIES = [
+    *(("4.47e-5 kg*m**2", "kg m^2", 4.47e-5), ("447 g cm^2", "kg m^2", 4.47e-5), ("43.378 mm", "m", 0.043378)),
+    *(("20 rpm", "rad/s", 20 * 2 * math.pi / 60), ("90 deg", "rad", math.pi / 2), ("5 kHz", "Hz", 5000.0)),
+    *(("3 N/mm**3", "N/m^3", 3e9), ("0.5 kg*cm**2", "kg m^2", 5e-5), ("2e-6 m/s", "m/s", 2e-6)),
+]
+
+
+@pytest.mark.parametrize(("text", "unit", "expected"), TEXTS + QUANTITIES)
 def test_units_are_converted(text, unit, expected):
     assert quantity(text, Parameter(unit, "something"), "path") == pytest.approx(expected)
 
@@ -154,15 +149,9 @@ class TestPint:
     @pytest.mark.parametrize(
         ("text", "unit", "expected"),
         [
-            ("20 rpm", "rad/s", 20 * 2 * math.pi / 60),
-            ("90 deg", "rad", math.pi / 2),
-            ("5 kHz", "Hz", 5000.0),
-            ("3 N/mm**3", "N/m^3", 3e9),
-            ("0.5 kg*cm**2", "kg m^2", 5e-5),
-            ("30 percent", "1", 0.3),
-            ("36 km/hour", "m/s", 10.0),
+            *QUANTITIES,
+            *(("30 percent", "1", 0.3), ("36 km/hour", "m/s", 10.0), ("1 chain", "m", 20.1168402)),
             ("2 force_pound", "N", 8.896443230521),
-            ("1 chain", "m", 20.1168402),
         ],
     )
     def test_quantity_is_converted_to_the_unit_of_the_parameter(self, registry, text, unit, expected):

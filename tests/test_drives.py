@@ -12,6 +12,7 @@ from scipy.integrate import quad
 from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
+from ringsweep.models import parameters
 from ringsweep.models.parts import drive_of
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import (
@@ -60,6 +61,16 @@ def test_every_drive_is_tested():
 
 
 @pytest.mark.parametrize("drive", SAMPLES, ids=lambda drive: type(drive).__name__)
+@pytest.mark.parametrize("law", DRIVES)
+def test_words_for_a_drive_of_a_belt_tell_of_a_line(law):
+    for path, p in parameters(Structure("belt", "coulomb", law)).items():
+        if path.startswith("drive."):
+            words = f"{p.unit} {p.long_name} {p.unit_in_words}"
+            assert ("rad" in words) == (path == "drive.phase")
+            assert "ring" not in words
+            assert "angular" not in words
+
+
 class TestDerivatives:
     """Derivatives of the shape against finite differences."""
 
