@@ -60,7 +60,6 @@ def test_every_drive_is_tested():
     assert {type(drive) for drive in SAMPLES} == set(DRIVES.values())
 
 
-@pytest.mark.parametrize("drive", SAMPLES, ids=lambda drive: type(drive).__name__)
 @pytest.mark.parametrize("law", DRIVES)
 def test_words_for_a_drive_of_a_belt_tell_of_a_line(law):
     for path, p in parameters(Structure("belt", "coulomb", law)).items():
@@ -71,6 +70,7 @@ def test_words_for_a_drive_of_a_belt_tell_of_a_line(law):
             assert "angular" not in words
 
 
+@pytest.mark.parametrize("drive", SAMPLES, ids=lambda drive: type(drive).__name__)
 class TestDerivatives:
     """Derivatives of the shape against finite differences."""
 
