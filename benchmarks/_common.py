@@ -14,13 +14,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from math import radians
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
 
+from benchmarks.rows import RING, ZONES
 from ringsweep import config
 from ringsweep.models import batch, model_of
 from ringsweep.runs import cells, contenders, sweep
@@ -33,24 +33,11 @@ CORE = "BENCHMARKS_CORE"
 #: Results that the documents show.
 RESULTS = Path(__file__).parent / "results"
 
-#: The ring of the paper's Fig. 29 (SI units), without its friction law.
 SPAN = 10.0
 PAPER_STEPS = 5000
-BODY = {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01}
-RADIUS, GRAVITY = 0.043378, 9.81
-ROUGH, REST = {"mu_s": 0.5, "mu_k": 0.3}, {"mu_s": 0.2, "mu_k": 0.1}
+ROUGH, REST = ZONES["rough"], ZONES["rest"]
 #: Parameters of the Bengisu-Akay law in Fig. 29.
 ALPHA, V0 = 1e5, 2e-6
-_RING: dict[str, Any] = {
-    "model": "ring",
-    "body": BODY,
-    "ring": {"radius": RADIUS},
-    "zone": {"half_angle": radians(15.0)},
-    "drive": {"law": "arctan", "amplitude": 2.0},
-    "initial": {"phi": 0.0, "omega": 0.0},
-    "time": {"span": SPAN},
-    "gravity": GRAVITY,
-}
 
 #: A cell of the family: amplitude of the drive (rad/s), half-angle of the zone (rad).
 Cell = tuple[float, float]
@@ -58,7 +45,7 @@ Cell = tuple[float, float]
 
 def ring(law: Mapping[str, Any]) -> dict[str, Any]:
     """Scene of Fig. 29 under a friction law, given as the keys of `friction`."""
-    return _RING | {"friction": {**law, "rough": ROUGH, "rest": REST}}
+    return RING | {"friction": {**law, **ZONES}}
 
 
 def family(side: int) -> list[Cell]:

@@ -410,7 +410,6 @@ class Count:
     ends: Counter = field(default_factory=Counter)
     seconds: Counter = field(default_factory=Counter)
     listings: list = field(default_factory=list)
-    verbose: bool = False
     #: Number of the batch in its family: of many small batches as many runs are asked about as of a large one.
     number: int = 0
 
@@ -426,7 +425,7 @@ class Count:
         self.listings.append(f"\n# {word}; reference: {why}\n# ringsweep: {said}\n{listing}")
 
 
-def answers(kind, batch, solver):
+def answers(kind, batch, solver="auto"):
     """Dataset of the package for a batch of scenes of one kind."""
     axes = {path: xr.DataArray([values[path] for values in batch], dims="run") for path in batch[0]}
     return ringsweep.sweep(nest(kind, batch[0]), axes, solver=solver, jobs=1, progress=False)
@@ -451,7 +450,7 @@ def second_opinion(scene, regime, contact, t, verdict, count):
     count.seconds["compliant"] += time.process_time() - begin
     end = f"{word} {contact}" if word == "separating" else word
     count.ends[end, found.word] += 1
-    if found.word == "contradicted" or (count.verbose and found.word == "undecided"):
+    if found.word == "contradicted":
         count.list_scene(f"{found.word} by the compliant body", scene, found.why, f"{end}, {t:.9g} s")
 
 
@@ -501,8 +500,6 @@ def compare(kind, batch, data, count):
         count.tally[state] += 1
         count.tally["certified" if certified else "uncertified"] += 1
         if state != "clear" or not certified:
-            if count.verbose and state == "unresolved":
-                count.list_scene("unresolved", scene, verdict.why, "")
             continue
         if kind.force and not math.isfinite(float(data.x_end_error[i])):
             count.tally["no bound"] += 1
@@ -534,14 +531,14 @@ def compare(kind, batch, data, count):
 
 
 def run_batch(task):
-    """Count of about `many` scenes of a kind; a task is kind, `many`, seed, solver, and whether to list more."""
-    kind, many, seed, solver, verbose = task
-    rng, count = np.random.default_rng(seed), Count(verbose=verbose, number=seed[-1])
+    """Count of about `many` scenes of a kind; a task is kind, `many` and seed."""
+    kind, many, seed = task
+    rng, count = np.random.default_rng(seed), Count(number=seed[-1])
     # Long runs, or runs that cost the reference much.
     share = many * (0.1 if kind.force else 0.3 if kind.far else 1.0)
     batch = [draw(rng, kind) for _ in range(max(1, round(share)))]
     begin = time.process_time()
-    data = answers(kind, batch, solver)
+    data = answers(kind, batch)
     count.seconds["package"] += time.process_time() - begin
     compare(kind, batch, data, count)
     return count
@@ -573,8 +570,6 @@ def main():
     parser.add_argument("--count", type=int, help=f"scenes (default {COUNT}; {QUICK} with --quick)")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--families", nargs="+", metavar="NAME", help=", ".join(families()))
-    parser.add_argument("--solver", default="auto")
-    parser.add_argument("--verbose", action="store_true", help="also print scenes that the reference could not resolve")
     parser.add_argument("--csv", type=Path, help="write the 500 scenes of the tests instead")
     parser.add_argument("--impacts", type=Path, help="write the scenes with impacts of the tests instead")
     arguments = parser.parse_args()
@@ -591,10 +586,7 @@ def main():
     counts, total = {name: Count() for name in chosen}, Count()
     many = (arguments.count or (QUICK if arguments.quick else COUNT)) / len(chosen)
     batches = [(name, k, kind) for name, kinds in chosen.items() for k, kind in enumerate(kinds)]
-    tasks = [
-        (kind, many / len(chosen[name]), [arguments.seed, *name.encode(), k], arguments.solver, arguments.verbose)
-        for name, k, kind in batches
-    ]
+    tasks = [(kind, many / len(chosen[name]), [arguments.seed, *name.encode(), k]) for name, k, kind in batches]
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
         for (name, k, _), count in zip(tqdm(batches, disable=None), pool.map(run_batch, tasks), strict=True):
             counts[name].add(count)

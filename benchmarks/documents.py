@@ -28,13 +28,9 @@ def documents() -> Iterator[Path]:
 
 def kept() -> dict[tuple[str, str], str]:
     """Kept figures, by name of the benchmark and of the figure."""
-    return {(path.stem, key): text for path in RESULTS.glob("*.json") for key, text in read(path).items()}
-
-
-def read(path: Path) -> dict[str, str]:
-    """Figures of one benchmark."""
-    found: dict[str, str] = json.loads(path.read_text())
-    return found
+    return {
+        (path.stem, key): text for path in RESULTS.glob("*.json") for key, text in json.loads(path.read_text()).items()
+    }
 
 
 def used(text: str) -> set[tuple[str, str]]:

@@ -19,7 +19,8 @@ import numpy as np
 #: Least time of a measurement, s: a call that is shorter is repeated.
 SHORTEST = 0.1
 
-_RING: dict[str, Any] = {
+#: The ring of the paper's Fig. 29 (SI units), without its friction law.
+RING: dict[str, Any] = {
     "model": "ring",
     "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
     "ring": {"radius": 0.043378},
@@ -28,7 +29,7 @@ _RING: dict[str, Any] = {
     "initial": {"phi": 0.0, "omega": 0.0},
     "time": {"span": 10.0},
 }
-_ZONES = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
+ZONES = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
 _BELT: dict[str, Any] = {
     "model": "belt",
     "body": {"mass": 1.0},
@@ -48,7 +49,7 @@ _FORCED = _BELT | {
 
 def ring(law: str, **numbers: float) -> dict[str, Any]:
     """Ring of the paper's Fig. 29 under a friction law."""
-    return _RING | {"friction": {"law": law, **numbers, **_ZONES}}
+    return RING | {"friction": {"law": law, **numbers, **ZONES}}
 
 
 def belt(law: str, **numbers: float) -> dict[str, Any]:

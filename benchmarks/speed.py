@@ -45,6 +45,7 @@ from benchmarks._common import (
     shown,
 )
 from benchmarks.peers import in_c
+from benchmarks.rows import belt
 from benchmarks.work_precision import SCENES
 from ringsweep.models import MODELS
 from ringsweep.runs import sweep
@@ -58,17 +59,8 @@ PLAIN = "plain.c, same step"
 SMOOTH, STIFF, LIMIT = SCENES["smooth"], SCENES["stiff"], SCENES["limit"]
 #: The ring under LuGre's law, and the belt under Bengisu and Akay's and under LuGre's.
 RING_LUGRE = ring({"law": "lugre", "sigma0": 1e3, "sigma1": 30.0, "sigma2": 0.1, "v_s": 1e-2})
-_BELT: dict[str, Any] = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 2.0},
-    "time": {"span": 20.0},
-}
-_COEFFICIENTS = {"mu_s": 0.15, "mu_k": 0.1}
-BELT = _BELT | {"friction": {"law": "bengisu-akay", "alpha": 100.0, "v0": 0.01, **_COEFFICIENTS}}
-BELT_LUGRE = _BELT | {
-    "friction": {"law": "lugre", "sigma0": 1e5, "sigma1": 316.2, "sigma2": 0.4, "v_s": 1e-3, **_COEFFICIENTS}
-}
+BELT = belt("bengisu-akay", alpha=100.0, v0=0.01)
+BELT_LUGRE = belt("lugre", sigma0=1e5, sigma1=316.2, sigma2=0.4, v_s=1e-3)
 
 
 class Effort(NamedTuple):

@@ -2,7 +2,6 @@
 
     python -m benchmarks.stability            # about five minutes
     python -m benchmarks.stability --quick    # coarser maps
-    python -m benchmarks.stability --redraw   # only the picture, from the stored numbers
 
 Every run is put into one of four classes against a reference:
 
@@ -233,7 +232,6 @@ def draw_maps(quick: bool) -> tuple[xr.Dataset, list[Map]]:
         put("error", [difference(*pair)[1] * CLOSE for pair in both], "float64",
             long_name="larger of the errors of phi_end (rad) and t_separation (s)")  # fmt: skip
         put("certified", [found["certified"] for found, _ in both], "int8", long_name="certified")
-        put("steps", [found["steps"] for found, _ in both], "int64", long_name="steps of the integration")
         put("reference_certified", [ref["certified"].broadcast_like(found["regime"]) for found, ref in both], "int8",
             long_name="whether the reference agrees with itself at thirty times its tolerance")  # fmt: skip
         if "stiffness" in both[0][0]:
@@ -347,13 +345,8 @@ this tolerance, that both agree shows nothing: it is uncertified there, and runs
 
 def main() -> None:
     """Run the benchmark and write its results."""
-    parser = command(__doc__)
-    parser.add_argument("--redraw", action="store_true", help="only draw the stored numbers again")
-    given = parser.parse_args()
+    given = command(__doc__).parse_args()
     folder = folder_of(given)
-    if given.redraw:
-        picture(xr.load_dataset(folder / "stability.nc"), maps(given.quick), folder / "stability.png")
-        return
     print(where := machine(), flush=True)
     ds, chosen = draw_maps(given.quick)
     ds.attrs = {

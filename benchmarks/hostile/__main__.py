@@ -16,7 +16,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks._common import machine, markdown
@@ -30,22 +29,13 @@ from benchmarks.hostile.writers import writers
 SEED = 20241121
 
 
-@dataclass(frozen=True)
-class Part:
-    """An attack: its function, which gets a folder, a count and a seed, and its counts, long and short."""
-
-    attack: Callable[[Path, int, int], Report]
-    count: int
-    short: int
-
-
-#: To add a part, add a line.
-PARTS = {
-    "configurations": Part(configurations, 10_000, 20),
-    "files": Part(damaged_files, 1000, 4),
-    "faults": Part(faults, 100_000, 4),
-    "writers": Part(writers, 100, 1),
-    "kills": Part(kills, 500, 3),
+#: Each part: its attack, which gets a folder, a count and a seed, and its counts, long and short.
+PARTS: dict[str, tuple[Callable[[Path, int, int], Report], int, int]] = {
+    "configurations": (configurations, 10_000, 20),
+    "files": (damaged_files, 1000, 4),
+    "faults": (faults, 100_000, 4),
+    "writers": (writers, 100, 1),
+    "kills": (kills, 500, 3),
 }
 
 
@@ -62,14 +52,14 @@ def main() -> int:
     rows, broken = [], []
     about = machine()
     for name in arguments.parts or PARTS:
-        part = PARTS[name]
-        count = arguments.count or (part.short if arguments.short else part.count)
+        attack, many, few = PARTS[name]
+        count = arguments.count or (few if arguments.short else many)
         begin = time.monotonic()
         with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
             # The folder of a part lies in another one, where it can leave what must be looked at.
             work = Path(folder) / name
             work.mkdir()
-            report = part.attack(work, count, arguments.seed)
+            report = attack(work, count, arguments.seed)
         broken += report.broken
         print(f"{name}: {report.counts.total()} in {time.monotonic() - begin:.0f} s", flush=True)
         rows += [[name, outcome, str(times)] for outcome, times in sorted(report.counts.items())]
