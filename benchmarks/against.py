@@ -34,7 +34,7 @@ from statistics import median
 from threading import Thread
 from typing import Any, NamedTuple
 
-from benchmarks._common import command, heading, machine, markdown, publish, table
+from benchmarks._common import command, machine, publish, shown
 from benchmarks.rows import ROWS
 
 ROOT = Path(__file__).parent.parent
@@ -292,11 +292,10 @@ def main() -> int:
             for row in rows:
                 print("  ".join(row.cells()), flush=True)
                 found.append(row)
-    heading("Against the fastest tree")
-    table(HEADER, [row.cells() for row in found])
+    rows_found = shown("Against the fastest tree", HEADER, [row.cells() for row in found])
     slower = [row.name for row in found if row.slower]
     print(f"\nslower beyond the scatter: {'; '.join(slower) or 'none'}")
-    publish(given, "against", "Against the fastest tree", where, markdown(HEADER, [row.cells() for row in found]))
+    publish(given, "against", "Against the fastest tree", where, rows_found)
     return 1 if slower else 0
 
 

@@ -28,9 +28,8 @@ def documents() -> Iterator[Path]:
 
 def kept() -> dict[tuple[str, str], str]:
     """Kept figures, by name of the benchmark and of the figure."""
-    return {
-        (path.stem, key): text for path in RESULTS.glob("*.json") for key, text in json.loads(path.read_text()).items()
-    }
+    files = {path.stem: json.loads(path.read_text()) for path in RESULTS.glob("*.json")}
+    return {(name, key): text for name, figures in files.items() for key, text in figures.items()}
 
 
 def used(text: str) -> set[tuple[str, str]]:
