@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.axes import Axes, dimension, paths_of, read_spacing, swept_parameter
+from ringsweep.config.axes import Axes, paths_of, read_spacing, swept_parameter
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.scene import outcome_numbers, sweepable
 from ringsweep.config.sections import boolean, check_keys, one_of, read_values, suggestion
@@ -254,8 +254,6 @@ def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
                 raise InputError(where, "also an axis of the sweep: a path can vary in one place only")
             if any(path in other.paths for other in left.values()):
                 raise InputError(where, f"{path} is drawn twice")
-            if dimension(path) in ("sample", "replicate", "word", "parameter"):
-                raise InputError(where, "the path has the name of a dimension of the result")
         left[where] = _factor(spec, parameters, where, known)
     found: list[Factor] = []
     while left:
