@@ -123,8 +123,8 @@ class Accessor:
         found = history_at(self._ds, np.atleast_1d(wanted))
         return found if wanted.ndim else found.isel(time=0)
 
-    def map(self, var: str = "regime", **options: Any) -> Figure:
-        """A map of a variable; other arguments as for :func:`ringsweep.plots.regime_map`."""
+    def map(self, var: str | None = None, **options: Any) -> Figure:
+        """The picture that suits a variable, or the dataset; arguments as for :func:`ringsweep.plots.regime_map`."""
         from ringsweep.plots.maps import regime_map
 
         return regime_map(self._ds, var=var, **options)

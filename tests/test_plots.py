@@ -515,6 +515,34 @@ def test_line_is_drawn_with_all_values_of_a_long_axis():
     assert len(plots.regime_map(make_sweep((5000,)), var="t_separation").axes[0].lines[0].get_xdata()) == 5000
 
 
+def sampled(*sizes: int) -> xr.Dataset:
+    """Probabilities of two regimes along axes; one of them is never met in the first cell."""
+    dims = ("drive_amplitude", "zone_half_angle")[: len(sizes)]
+    share = np.linspace(0.0, 1.0, int(np.prod(sizes))).reshape(sizes) ** 8
+    both = xr.DataArray(np.stack([share, 1.0 - share, 0.0 * share], -1), dims=(*dims, "word"))
+    coords = {dim: make_sweep(sizes)[dim] for dim in dims} | {"word": ["separating", "oscillatory", "jammed"]}
+    ends = {"probability_low": 0.9 * both, "probability_high": 0.1 + 0.9 * both}
+    return xr.Dataset({"probability": both} | ends, coords)
+
+
+def test_probability_along_one_axis_is_a_line_with_a_band_for_each_regime():
+    ds = sampled(12)
+    figure = plots.regime_map(ds)
+    assert [ax.get_title() for ax in figure.axes] == ["word = separating", "word = oscillatory"]
+    for ax, word in zip(figure.axes, ds["word"].values, strict=False):
+        band = ax.collections[-1].get_paths()[0].vertices
+        assert {0.9 * float(ds["probability"].sel(word=word).min()), 1.0} <= set(band[:, 1])
+    # No cell has the colour of zeros.
+    assert entries(figure) == []
+    assert "word = separating" in title(plots.regime_map(ds.isel(word=[0])))
+
+
+def test_one_sampled_cell_is_drawn_as_bars_and_a_grid_of_cells_as_maps():
+    bars = plots.regime_map(sampled(12), sel={"drive_amplitude": 10.0})
+    assert bars.axes[0].get_xlabel() == "probability (95 % interval)"
+    assert len(mesh(plots.regime_map(sampled(4, 3))).get_array()) == 3
+
+
 PICTURES = {
     "map": lambda: plots.regime_map(named_sweep()),
     "map of numbers": lambda: plots.regime_map(named_sweep(), var="t_separation"),

@@ -434,6 +434,7 @@ def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatc
         ["run", "my.nc", "-o", "again.nc", "--jobs", "1"],
         ["map", "my.nc", "--boundaries", "riding", "--tolerance", "1e-3", "-o", "boundary.png"],
         ["map", "my.nc", "--var", "survival", "-o", "survival.png"],
+        ["plot", "my.nc", "-o", "both.png"],
         ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9"],
         ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9", "--kind", "survival", "-o", "s.pdf"],
         ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9", "--kind", "sensitivity"],
@@ -442,7 +443,7 @@ def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatc
     capsys.readouterr()
     for arguments, words in (
         (["map", "my.nc", "-o", "my.html"], "no runs to point at"),
-        (["plot", "my.nc"], "has several cells: hold belt_velocity (4), time_span (4)"),
+        (["plot", "my.nc", "--kind", "survival"], "has several cells: hold belt_velocity (4), time_span (4)"),
         (["plot", "my.nc", "--kind", "phase"], "is for histories"),
         (["plot", "my.nc", "--word", "riding"], "--kind sensitivity"),
         (["map", "my.nc", "--sel", "word=ridin"], "did you mean riding?"),

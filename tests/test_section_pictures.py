@@ -11,6 +11,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from ringsweep import InputError, cli, plots
+from ringsweep.accessor import Accessor
 from ringsweep.plots.look import PAIR_COLOURS
 
 mpl.use("Agg")
@@ -127,6 +128,22 @@ def test_the_command_draws_multipliers_of_one_axis_in_the_circle(multipliers, di
     multipliers.assign_attrs(diagram.attrs).to_netcdf(tmp_path / "one.nc")
     assert cli.main(["map", str(tmp_path / "one.nc"), "--var", "multiplier_1"]) == 0
     assert (tmp_path / "one-multiplier_1.png").exists()
+
+
+def test_all_ways_to_a_picture_choose_the_diagram(diagram):
+    accessor = Accessor(diagram)
+    drawn = [plots.regime_map(diagram), accessor.map(), accessor.map("x_section")]
+    assert [[ax.get_ylabel() for ax in figure.axes] for figure in drawn] == [
+        ["x (m)", "exponent (s$^{-1}$)", "multipliers"]
+    ] * 3
+    # What only a map has makes it a map, and so does its variable.
+    for options in ({"y": "direction"}, {"var": "regime"}):
+        assert "x (m)" not in [ax.get_ylabel() for ax in plots.regime_map(diagram, **options).axes]
+    several = xr.concat([diagram, diagram], xr.DataArray([1.0, 2.0], dims="belt_velocity", name="belt_velocity"))
+    with pytest.raises(InputError, match="a diagram has one axis"):
+        plots.regime_map(several, var="x_section")
+    with pytest.raises(InputError, match=r"points of sections: plots\.bifurcation draws them"):
+        plots.map_panel(diagram, var="x_section", ax=Figure().subplots())
 
 
 @pytest.mark.slow

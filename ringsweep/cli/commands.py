@@ -61,7 +61,6 @@ def run_command(arguments: argparse.Namespace) -> int:
         print(describe(config, target, arguments.jobs, arguments.reuse))
         return 0
 
-    from ringsweep.cli import drawing
     from ringsweep.cli.report import status_of, summarise
     from ringsweep.runs.executors import Execution
     from ringsweep.runs.sweep import write
@@ -79,10 +78,8 @@ def run_command(arguments: argparse.Namespace) -> int:
         status = status_of(result)
         if not computed and picture.exists() and picture.stat().st_mtime >= target.stat().st_mtime:
             return status
-        if config.axes.sizes:
+        if config.axes.sizes or config.sample is not None:
             _draw(lambda: ringsweep.plots.regime_map(result), picture, f"ringsweep map {target}")
-        elif config.sample is not None:
-            _draw(lambda: drawing.panel(ringsweep.plots.probability_panel, result), picture, f"ringsweep plot {target}")
     return status
 
 

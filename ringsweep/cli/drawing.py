@@ -13,10 +13,9 @@ from matplotlib.figure import Figure
 from ringsweep import plots
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_sampled, resolve
-from ringsweep.plots.maps import Map
-from ringsweep.plots.sections import has_circle, has_diagram, points_of
+from ringsweep.plots.maps import Map, suitable
+from ringsweep.plots.sections import points_of
 from ringsweep.plots.selection import select, select_grid
-from ringsweep.quantities.variables import POINTS
 from ringsweep.storage import files, netcdf
 
 _SAMPLE_KINDS = ("probability", "survival", "sensitivity")
@@ -38,14 +37,11 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     """Draw a variable of a sweep: as a map, a bifurcation diagram, a circle of multipliers, or a page."""
     selection = dict(_selection(text) for text in arguments.sel)
     fixed = {name.replace(".", "_") for name in selection}
-    diagram = arguments.var in POINTS
-    # A file of one axis is drawn as a diagram, unless something is asked for that only a map has.
     plain = not (arguments.y or arguments.log or arguments.boundaries or str(arguments.output).endswith(".html"))
+    kind, var = suitable(result, arguments.var, selection, plain)
+    # A page and the boundaries need a variable, other pictures choose it by themselves.
+    arguments.var = var if kind == "diagram" or not plain else arguments.var
     along = result.isel(dict.fromkeys(fixed & set(map(str, result.dims)), 0))
-    circle = str(arguments.var).startswith("multiplier_") and plain and has_circle(along)
-    if arguments.var is None:
-        diagram = plain and has_diagram(along)
-        arguments.var = points_of(result)[0] if diagram else "regime"
     if arguments.var == "attractor" and points_of(result):
         from ringsweep.runs.attractors import attractors
 
@@ -95,10 +91,6 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     if page:
         plots.save_page(result, target, *chosen)
         print(f"wrote {target}")
-    elif diagram:
-        save(plots.bifurcation(result, arguments.x, arguments.var, selection), target)
-    elif circle:
-        save(panel(plots.multiplier_circle, select(result, selection)[0], x=arguments.x), target)
     else:
         save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
 
@@ -150,7 +142,7 @@ def draw_plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
 
 
 def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
-    """Draw one cell of a sampled sweep."""
+    """Draw a sampled sweep, or one cell of it."""
     if arguments.law is not None or arguments.begin is not None or arguments.end is not None:
         raise InputError(str(dataset), "is a sampled sweep: --law, --from, --to are for histories")
     if arguments.kind not in (None, *_SAMPLE_KINDS):
@@ -159,9 +151,13 @@ def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> N
     if arguments.word is not None and kind != "sensitivity":
         raise InputError("--word", "is that of --kind sensitivity")
     target = _picture_of(dataset, arguments.output, arguments.kind, *map(_name_part, arguments.sel))
-    result, _ = select(result, dict(_selection(text) for text in arguments.sel))
+    selection = dict(_selection(text) for text in arguments.sel)
+    if kind == "probability":
+        save(plots.regime_map(result, sel=selection), target)
+        return
     draw = getattr(plots, f"{kind}_panel")
-    save(panel(draw, result, **({"word": arguments.word} if arguments.word else {})), target)
+    options = {"word": arguments.word} if arguments.word else {}
+    save(panel(draw, select(result, selection)[0], **options), target)
 
 
 def _picture_of(dataset: Path, output: str | None, *parts: str | None) -> Path:

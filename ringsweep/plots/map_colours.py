@@ -187,7 +187,12 @@ def _span(ds: xr.Dataset) -> str:
 
 
 def legend_entries(
-    scale: ColourScale, ds: xr.Dataset, data: xr.DataArray, warnings: list[CellWarning], scattered: bool
+    scale: ColourScale,
+    ds: xr.Dataset,
+    data: xr.DataArray,
+    warnings: list[CellWarning],
+    scattered: bool,
+    is_line: bool,
 ) -> list[Artist]:
     """Entries of the legend for classes, missing values and warnings, each with its share of the cells."""
     entries: list[Artist] = []
@@ -204,7 +209,7 @@ def legend_entries(
     if not shown.all():
         other = ~shown & ~_inferred_apart(ds, data).values
         add(other, missing_text(ds, data), look.on_page(look.NO_VALUE))
-    if isinstance(scale.norm, colors.LogNorm):
+    if isinstance(scale.norm, colors.LogNorm) and not is_line:
         add(data.values == 0.0, "exactly 0", ZERO)
     ink = look.on_page("black")
     for warning in warnings:

@@ -22,8 +22,11 @@ from ringsweep.plots import labels, look
 from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve, scene_text
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import CellWarning, ColourScale, cell_warnings, legend_entries
+from ringsweep.plots.probability import probability_panel
+from ringsweep.plots.sections import bifurcation, has_circle, has_diagram, multiplier_circle, points_of
+from ringsweep.plots.selection import select
 from ringsweep.quantities.units import percent_at_most
-from ringsweep.quantities.variables import AUDITED, INFERRED, swept
+from ringsweep.quantities.variables import AUDITED, INFERRED, POINTS, swept
 
 _MOST_PANELS = 25
 
@@ -46,7 +49,7 @@ def regime_map(
     ds: xr.Dataset,
     x: str | None = None,
     y: str | None = None,
-    var: str = "regime",
+    var: str | None = None,
     sel: Mapping[str, float | str] | None = None,
     boundaries: xr.Dataset | None = None,
     title: bool | str = True,
@@ -68,8 +71,9 @@ def regime_map(
         Result of a sweep.
     x, y : str, optional
         Coordinates of the horizontal and the vertical axis; by default the first and the second that were swept.
-    var : str
-        Variable to draw.
+    var : str, optional
+        Variable to draw; by default the regime. If the sweep has sections along one axis, they are drawn as a
+        :func:`bifurcation` diagram instead, and one sampled cell as a :func:`probability_panel`.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
         text may have a unit. A warning and the title state the value taken if it is another.
@@ -112,6 +116,15 @@ def regime_map(
     >>> regime_map(ds, var="phi_max").axes[0].get_ylabel()
     'angle (°)'
     """
+    kind, var = suitable(ds, var, sel or {}, boundaries is None and not (y or norm or cmap or units))
+    if kind == "diagram":
+        return bifurcation(ds, x, var, sel)
+    width = look.figure_width()
+    if kind != "map":
+        figure = Figure(figsize=(width, 0.65 * width), layout="constrained")
+        one, ax = select(ds, sel or {})[0], figure.add_subplot()
+        _ = multiplier_circle(one, x, ax) if kind == "circle" else probability_panel(one, ax)
+        return figure
     found = Map(ds, (x, y), var, sel, (norm, cmap), units)
     if boundaries is not None:
         found.entries.append(found.curve_entry(boundaries))
@@ -119,7 +132,6 @@ def regime_map(
             # Cells of a strip meet where the boundary is: halfway would leave slivers of the wrong colour beside it.
             places = boundaries[found.horizontal.name].values * found.horizontal.factor
             found.horizontal = replace(found.horizontal, meet=places)
-    width = look.figure_width()
     if len(found.panels) > 1:
         return found.draw_panels(width, title, legend)
     height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
@@ -130,6 +142,24 @@ def regime_map(
     if boundaries is not None:
         found.draw_curves(ax, boundaries)
     return figure
+
+
+def suitable(ds: xr.Dataset, var: str | None, sel: Mapping[str, float | str], plain: bool) -> tuple[str, str]:
+    """Kind of picture that suits a variable of a sweep, and the variable; `var` is None for any.
+
+    The kind is ``"diagram"``, ``"circle"``, ``"bars"`` or ``"map"``. Unless `plain`, something is wanted that only a
+    map has.
+    """
+    require_sweep(ds)
+    ds = ds.isel({name: 0 for name in (one.replace(".", "_") for one in sel) if name in ds.dims})
+    if var in POINTS or (plain and var is None and has_diagram(ds)):
+        return "diagram", var or points_of(ds)[0]
+    if plain and str(var).startswith("multiplier_") and has_circle(ds):
+        return "circle", str(var)
+    is_cell = is_sampled(ds) and all(dim == "word" or size == 1 for dim, size in ds["probability"].sizes.items())
+    if plain and var in (None, "probability") and is_cell and "word" in ds.dims:
+        return "bars", "probability"
+    return "map", var or "regime"
 
 
 def map_panel(
@@ -242,6 +272,8 @@ class Map:
                 occurs = ds["probability"] > 0.0
                 ds = ds.isel(word=occurs.any([dim for dim in occurs.dims if dim != "word"]).values)
         var = resolve("var", var, numeric_names(ds))
+        if var in POINTS:
+            raise InputError("var", f"{var} are the points of sections: plots.bifurcation draws them")
         self.ds, held, horizontal, vertical = choose_axes(ds, var, sel, *axes)
         data = labels.displayed(self.ds[var])
         self.scattered = is_scattered(horizontal, vertical)
@@ -258,7 +290,7 @@ class Map:
         self.data = labels.displayed(thin[var])
         self.horizontal, self.vertical = horizontal.within(thin), vertical.within(thin) if vertical else None
         self.warnings = [replace(warning, cells=warning.cells.isel(drawn)) for warning in warnings]
-        self.entries = legend_entries(self.scale, self.ds, data, warnings, self.scattered)
+        self.entries = legend_entries(self.scale, self.ds, data, warnings, self.scattered, vertical is None)
         share = math.prod(self.ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
         # The legend of a map of origins has the shares, and its title is long.
@@ -267,7 +299,8 @@ class Map:
         if var == "origin":
             name, told = "cells run or inferred", []
             audit = [text.replace("others: at most", "inferred: ≤") for text in audit[1:]]
-        self.texts = [name, *held, *told, *thinning, *audit]
+        only = self.panels[0][0] if len(self.panels) == 1 else []
+        self.texts = [name, *only, *held, *told, *thinning, *audit]
 
     @property
     def vertical_label(self) -> str:
@@ -402,6 +435,8 @@ class Map:
         grey = look.on_page(look.NO_VALUE)
         axes.broken_barh(gaps, (0, 1), transform=axes.get_xaxis_transform(), color=grey, linewidth=0)
         axes.plot(x, numbers, marker="o" if len(x) <= 100 else ".", markersize=4, color=look.pair(0))
+        if self.data.name == "probability":
+            axes.set_ylim(-0.02, 1.02)
         ends = [f"{self.data.name}{end}" for end in ("_low", "_high")]
         if all(end in self.ds for end in ends):
             low, high = (self.horizontal.along(labels.displayed(self.ds[end].isel(index))) for end in ends)
