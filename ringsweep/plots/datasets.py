@@ -41,6 +41,12 @@ _TOLD = (
 )
 
 
+_NO_SWEEPS = (
+    ("time", "the time history of one run", "history"),
+    ("contender", "error against run time", "work_precision"),
+)
+
+
 def require_sweep(ds: xr.Dataset) -> None:
     """Refuse a dataset that is no sweep.
 
@@ -50,15 +56,11 @@ def require_sweep(ds: xr.Dataset) -> None:
         If it holds the history of a run, or error against run time, or if it is one variable only.
     """
     if not hasattr(ds, "data_vars"):
-        raise InputError(
-            "ds", f"a dataset is expected, got one variable: regime_map(ds, var={str(ds.name)!r}) draws it"
-        )
-    if "time" in ds.dims:
-        raise InputError("ds", "is the time history of one run, not a sweep; ringsweep plot draws it, or plots.history")
-    if "contender" in ds.dims:
-        raise InputError(
-            "ds", "is error against run time, not a sweep; ringsweep plot draws it, or plots.work_precision"
-        )
+        call = f"regime_map(ds, var={str(ds.name)!r})"
+        raise InputError("ds", f"a dataset is expected, got one variable: {call} draws it")
+    for dim, what, draws in _NO_SWEEPS:
+        if dim in ds.dims:
+            raise InputError("ds", f"is {what}, not a sweep; ringsweep plot draws it, or plots.{draws}")
 
 
 #: Dimensions that a sampled sweep has within a cell.
@@ -219,14 +221,12 @@ def scene_text(ds: xr.Dataset) -> list[str]:
         return []
     source = configuration_of(ds)
     swept_here = {str(c.attrs["path"]) for c in swept(ds)}
-    found = []
-    for path, before, after in _TOLD:
-        value = written(source, path)
-        if value is None or path in swept_here:
-            continue
-        is_number = isinstance(value, int | float)
-        found.append(f"{before}{value:.4g}{after}" if is_number else f"{before}{value}")
-    return found
+    values = [(written(source, path), *words) for path, *words in _TOLD if path not in swept_here]
+    return [
+        f"{before}{value:.4g}{after}" if isinstance(value, int | float) else f"{before}{value}"
+        for value, before, after in values
+        if value is not None
+    ]
 
 
 def resolve(argument: str, name: str, available: Iterable[Any]) -> str:

@@ -434,18 +434,15 @@ def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
     """Draw the strip that shows which zone lies under each contact."""
     at = _by_interval(ds["time"].values, ds[names[0]].values)[0]
     strip = np.array([_by_interval(ds["time"].values, ds[name].values)[1] for name in names])
-    arcs = int(max(1, strip.max()))
-    colours = [look.on_page(look.REST), *(look.arc_colour(k + 1) for k in range(arcs))]
-    norm = colors.BoundaryNorm(np.arange(arcs + 2) - 0.5, arcs + 1)
-    axes.pcolormesh(
-        at, np.arange(len(names) + 1), strip, cmap=colors.ListedColormap(colours), norm=norm, rasterized=True
-    )
+    surfaces = [("elsewhere", look.on_page(look.REST)), *look.arcs(int(max(1, strip.max())))]
+    palette = colors.ListedColormap([colour for _, colour in surfaces])
+    limits: dict[str, Any] = {"vmin": -0.5, "vmax": len(surfaces) - 0.5}
+    axes.pcolormesh(at, np.arange(len(names) + 1), strip, cmap=palette, rasterized=True, **limits)
     axes.hlines(range(1, len(names)), at[0], at[-1], color=look.page_colour(), linewidth=2)
     axes.set_yticks(np.arange(len(names)) + 0.5, labels=[f"contact {name[-1]}" for name in names], fontsize=look.SMALL)
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
-    surfaces = zip(colours, ["elsewhere", *look.arc_names(arcs)], strict=True)
-    handles: list[Artist] = [patches.Patch(facecolor=colour, edgecolor="0.7", label=name) for colour, name in surfaces]
+    handles: list[Artist] = [patches.Patch(facecolor=colour, edgecolor="0.7", label=name) for name, colour in surfaces]
     look.legend_above(axes, handles)
     axes.tick_params(axis="x", labelsize=look.SMALL)
 

@@ -194,14 +194,10 @@ def page_colour() -> Any:
     return "white" if np.mean(colors.to_rgb(matplotlib.rcParams["text.color"])) < 0.5 else "black"
 
 
-def arc_colour(number: int) -> str:
-    """Colour of a zone in every picture; `number` counts from 1."""
-    return CLASS_COLOURS[2 + (number - 1) % (len(CLASS_COLOURS) - 2)]
-
-
-def arc_names(count: int) -> list[str]:
-    """Names of `count` zones in a legend."""
-    return ["zone"] if count == 1 else [f"zone {k + 1}" for k in range(count)]
+def arcs(count: int) -> list[tuple[str, str]]:
+    """Name and colour of each of `count` zones, the same in every picture."""
+    colours = CLASS_COLOURS[2:]
+    return [("zone" if count == 1 else f"zone {k + 1}", colours[k % len(colours)]) for k in range(count)]
 
 
 def axes_or_current(ax: Axes | None, height: float) -> Axes:

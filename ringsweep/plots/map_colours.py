@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import colormaps, colors, lines, patches
-from matplotlib.artist import Artist
+from matplotlib import colormaps, colors
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -119,7 +118,7 @@ def cell_warnings(ds: xr.Dataset, data: xr.DataArray) -> list[CellWarning]:
     reason.
     """
     if data.name not in ("regime", "motion", "aftermath"):
-        apart = _inferred_apart(ds, data)
+        apart = inferred_apart(ds, data)
         return [CellWarning(_NOT_RUN, "//////", "x", apart)] if apart.any() else []
     found = []
     if "certified" in ds:
@@ -149,7 +148,7 @@ def missing_text(ds: xr.Dataset, data: xr.DataArray) -> str:
     if name in _EVENTS and not ended_early and (span := _span(ds)):
         text += f"\nwithin {span}"
     inferred = _missing_inferred(ds, data)
-    if inferred.any() and not _inferred_apart(ds, data).any():
+    if inferred.any() and not inferred_apart(ds, data).any():
         text = _NOT_RUN if inferred.equals(missing) else f"{text}, or\n{_NOT_RUN}"
     return text
 
@@ -163,7 +162,7 @@ def _missing_inferred(ds: xr.Dataset, data: xr.DataArray) -> xr.DataArray:
     return missing & (ds["origin"] == INFERRED) if "origin" in ds else missing & False
 
 
-def _inferred_apart(ds: xr.Dataset, data: xr.DataArray) -> xr.DataArray:
+def inferred_apart(ds: xr.Dataset, data: xr.DataArray) -> xr.DataArray:
     """Missing cells that were not run, if a map tells them from others that are missing; else none.
 
     A line cannot: it has no hatching.
@@ -186,52 +185,12 @@ def _span(ds: xr.Dataset) -> str:
     return str(span) if isinstance(span, str) else f"{number_text(span, 'g')} s"
 
 
-def legend_entries(
-    scale: ColourScale,
-    ds: xr.Dataset,
-    data: xr.DataArray,
-    warnings: list[CellWarning],
-    scattered: bool,
-    is_line: bool,
-) -> list[Artist]:
-    """Entries of the legend for classes, missing values and warnings, each with its share of the cells."""
-    entries: list[Artist] = []
-
-    def add(where: NDArray[Any], label: str, colour: Any) -> None:
-        if where.any():
-            entries.append(patches.Patch(color=colour, label=f"{label}, {_share(where)}"))
-
-    shown = np.isfinite(data.values)
-    if scale.flags is not None and scale.meanings is not None:
-        shown = np.isin(data.values, scale.flags)
-        for k, (flag, meaning) in enumerate(zip(scale.flags, scale.meanings, strict=True)):
-            add(data.values == flag, meaning, scale.colours(k))
-    if not shown.all():
-        other = ~shown & ~_inferred_apart(ds, data).values
-        add(other, missing_text(ds, data), look.on_page(look.NO_VALUE))
-    if isinstance(scale.norm, colors.LogNorm) and not is_line:
-        add(data.values == 0.0, "exactly 0", ZERO)
-    ink = look.on_page("black")
-    for warning in warnings:
-        label = f"{warning.label}, {_share(warning.cells.values)}"
-        if warning.everywhere:
-            entries.append(lines.Line2D([], [], linestyle="", label=warning.label if "certify is" in label else label))
-        elif scattered:
-            entries.append(lines.Line2D([], [], color=ink, linestyle="", marker=warning.marker, label=label))
-        else:
-            entries.append(
-                patches.Patch(facecolor="none", edgecolor=ink, hatch=warning.hatch, linewidth=0.5, label=label)
-            )
-            entries[-1].set(hatch_linewidth=0.5)
-    return entries
-
-
 def _with_grey(colours: str | colors.Colormap) -> colors.Colormap:
     """A colour map with grey for missing values."""
     palette = colormaps[colours] if isinstance(colours, str) else colours
     return palette.with_extremes(bad=colors.to_rgb(look.on_page(look.NO_VALUE)))
 
 
-def _share(mask: NDArray[Any]) -> str:
+def share_text(mask: NDArray[Any]) -> str:
     percent = 100 * float(np.mean(mask))
     return "< 0.1 %" if percent < 0.1 else "> 99.9 %" if 99.9 < percent < 100 else f"{percent:.1f} %"

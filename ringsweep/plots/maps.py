@@ -21,7 +21,15 @@ from ringsweep.errors import InputError
 from ringsweep.plots import labels, look
 from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve, scene_text
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
-from ringsweep.plots.map_colours import CellWarning, ColourScale, cell_warnings, legend_entries
+from ringsweep.plots.map_colours import (
+    ZERO,
+    CellWarning,
+    ColourScale,
+    cell_warnings,
+    inferred_apart,
+    missing_text,
+    share_text,
+)
 from ringsweep.plots.probability import probability_panel
 from ringsweep.plots.sections import bifurcation, has_circle, has_diagram, multiplier_circle, points_of
 from ringsweep.plots.selection import select
@@ -290,7 +298,7 @@ class Map:
         self.data = labels.displayed(thin[var])
         self.horizontal, self.vertical = horizontal.within(thin), vertical.within(thin) if vertical else None
         self.warnings = [replace(warning, cells=warning.cells.isel(drawn)) for warning in warnings]
-        self.entries = legend_entries(self.scale, self.ds, data, warnings, self.scattered, vertical is None)
+        self.entries = self._legend(data, warnings)
         share = math.prod(self.ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
         # The legend of a map of origins has the shares, and its title is long.
@@ -301,6 +309,37 @@ class Map:
             audit = [text.replace("others: at most", "inferred: ≤") for text in audit[1:]]
         only = self.panels[0][0] if len(self.panels) == 1 else []
         self.texts = [name, *only, *held, *told, *thinning, *audit]
+
+    def _legend(self, data: xr.DataArray, warnings: list[CellWarning]) -> list[Artist]:
+        """Entries of the legend for classes, missing values and warnings, each with its share of the cells."""
+        entries: list[Artist] = []
+
+        def add(where: NDArray[Any], label: str, colour: Any) -> None:
+            if where.any():
+                entries.append(patches.Patch(color=colour, label=f"{label}, {share_text(where)}"))
+
+        shown = np.isfinite(data.values)
+        if self.scale.flags is not None and self.scale.meanings is not None:
+            shown = np.isin(data.values, self.scale.flags)
+            for k, (flag, meaning) in enumerate(zip(self.scale.flags, self.scale.meanings, strict=True)):
+                add(data.values == flag, meaning, self.scale.colours(k))
+        if not shown.all():
+            other = ~shown & ~inferred_apart(self.ds, data).values
+            add(other, missing_text(self.ds, data), look.on_page(look.NO_VALUE))
+        if isinstance(self.scale.norm, colors.LogNorm) and self.vertical:
+            add(data.values == 0.0, "exactly 0", ZERO)
+        ink = look.on_page("black")
+        for warning in warnings:
+            label = f"{warning.label}, {share_text(warning.cells.values)}"
+            if warning.everywhere:
+                label = warning.label if "certify is" in label else label
+                entries.append(Line2D([], [], linestyle="", label=label))
+            elif self.scattered:
+                entries.append(Line2D([], [], color=ink, linestyle="", marker=warning.marker, label=label))
+            else:
+                entries.append(patches.Patch(fc="none", ec=ink, hatch=warning.hatch, linewidth=0.5, label=label))
+                entries[-1].set(hatch_linewidth=0.5)
+        return entries
 
     @property
     def vertical_label(self) -> str:
@@ -360,11 +399,8 @@ class Map:
         if self.vertical is None and self.scale.meanings is None:
             self._draw_line(axes, numbers, index)
             return
-        warnings = [
-            (warning, warning.cells.isel(index).transpose(*numbers.dims))
-            for warning in self.warnings
-            if not warning.everywhere
-        ]
+        seen = [warning for warning in self.warnings if not warning.everywhere]
+        warnings = [(warning, warning.cells.isel(index).transpose(*numbers.dims)) for warning in seen]
         if self.scattered and self.vertical:
             self._draw_points(axes, self.vertical, numbers, warnings)
         else:

@@ -97,8 +97,8 @@ def save_page(
 
     sweep = _Sweep.of(ds, x, y, var, sel or {})
     with replacing(path) as temporary:
-        page = file_html(_document(sweep), INLINE, _title(ds)).replace("<head>", f"<head>\n    {_VIEWPORT}", 1)
-        Path(temporary).write_text(page, encoding="utf-8")
+        page = file_html(_document(sweep), INLINE, str(ds.attrs.get("title", "ringsweep")))
+        Path(temporary).write_text(page.replace("<head>", f"<head>\n    {_VIEWPORT}", 1), encoding="utf-8")
 
 
 def check_page(path: str | os.PathLike[str]) -> None:
@@ -285,16 +285,12 @@ def _document(sweep: _Sweep) -> Any:
         how = {"mode": "vline" if renderer in shown["curve"] else "mouse", "limit": 1}
         plot.add_tools(models.HoverTool(tooltips=_TOOLTIP, formatters={"@{value}": tell}, renderers=[renderer], **how))
     document = Document()
-    heading = "; ".join([_title(ds), *map(plain_text, sweep.notes)])
+    heading = "; ".join([str(ds.attrs.get("title", "ringsweep")), *map(plain_text, sweep.notes)])
     notes = models.Div(text=heading, render_as_text=True, sizing_mode="stretch_width")
     choosers = row(variable, *slices, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
     document.add_root(column(notes, choosers, plot, sizing_mode="stretch_both"))
     document.js_on_event(DocumentReady, show)
     return document
-
-
-def _title(ds: xr.Dataset) -> str:
-    return str(ds.attrs.get("title", "ringsweep"))
 
 
 def _plot(horizontal: Axis, vertical: Axis | None) -> Any:

@@ -226,25 +226,16 @@ def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[
     margin = 0.0 if wrapped else 0.05 * (high - low) or _turn() / 72.0
     low, high = low - margin, high + margin
     entries: list[Artist] = []
-    arcs = zip(look.arc_names(len(rig.arcs)), rig.arcs, strict=True)
-    for number, (name, (center, half_angle)) in enumerate(arcs, start=1):
-        for contact in rig.contacts:
-            lines = ("///", "\\\\\\")[contact - 1] if len(rig.contacts) > 1 else None
-            fill: dict[str, Any] = {"facecolor": look.arc_colour(number), "alpha": 0.35, "linewidth": 0}
-            hatch: dict[str, Any] = {
-                "facecolor": "none",
-                "edgecolor": look.on_page("0.45"),
-                "linewidth": 0,
-                "hatch": lines,
-            }
-            middle, half = look.angle_unit()[0] * (center - rig.offset(contact)), look.angle_unit()[0] * half_angle
+    hatches = ("///", "\\\\\\") if len(rig.contacts) > 1 else (None,)
+    grey, edge, factor = look.on_page("0.45"), look.on_page("0.3"), look.angle_unit()[0]
+    for (name, colour), (center, half_angle) in zip(look.arcs(len(rig.arcs)), rig.arcs, strict=True):
+        for contact, hatch in zip(rig.contacts, hatches, strict=True):
+            style: dict[str, Any] = {"hatch": hatch, "linewidth": 0}
+            middle, half = factor * (center - rig.offset(contact)), factor * half_angle
             for left, right in _every_turn(middle - half, middle + half, low, high):
-                ax.axvspan(left, right, zorder=0.5, **fill)
-                ax.axvspan(left, right, zorder=0.6, **hatch).set(hatch_linewidth=0.4)
-            entry = patches.Patch(
-                facecolor=look.arc_colour(number), alpha=0.55, hatch=lines, edgecolor=look.on_page("0.3"), linewidth=0
-            )
-            entry.set(label=f"contact {contact} on {name}", hatch_linewidth=0.4)
+                ax.axvspan(left, right, fc=(colour, 0.35), ec=grey, zorder=0.5, **style).set(hatch_linewidth=0.4)
+            entry = patches.Patch(fc=colour, ec=edge, alpha=0.55, label=f"contact {contact} on {name}", **style)
+            entry.set(hatch_linewidth=0.4)
             entries.append(entry)
     ax.set_xlim(low, high)
     return entries
@@ -265,16 +256,11 @@ def _draw_broad_lines(
     """Draw a broad line under the curve where a contact is on a zone; returns the legend entries."""
     arcs = np.array([run[name].values for name in zones(run)])
     entries: list[Artist] = []
-    for number, name in enumerate(look.arc_names(int(arcs.max())), start=1):
+    for number, (name, colour) in enumerate(look.arcs(int(arcs.max())), start=1):
         here = np.where((arcs == number).any(axis=0), 0.0, np.nan)
-        style: dict[str, Any] = {
-            "color": look.arc_colour(number),
-            "linewidth": 6,
-            "alpha": 0.45,
-            "solid_capstyle": "butt",
-        }
-        ax.plot(*_curve(angle, speed + here, wrapped), zorder=1.5, **style)
-        entries.append(Line2D([], [], label=f"a contact on {name}", **style))
+        style: dict[str, Any] = {"color": colour, "linewidth": 6, "alpha": 0.45, "solid_capstyle": "butt"}
+        label = f"a contact on {name}"
+        entries += ax.plot(*_curve(angle, speed + here, wrapped), zorder=1.5, label=label, **style)
     return entries
 
 

@@ -146,8 +146,9 @@ class RingArtists(Instant):
         race = patches.Wedge((0.0, 0.0), 1.1 * R, 0.0, 360.0, facecolor=look.on_page(look.REST), zorder=1, **surface)
         self._draw_angles()
         self.arcs = []
-        for k, (_, half_angle) in enumerate(rig.arcs, start=1):
-            wedge = patches.Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, facecolor=look.arc_colour(k), **surface)
+        surfaces = look.arcs(len(rig.arcs))
+        for (_, colour), (_, half_angle) in zip(surfaces, rig.arcs, strict=True):
+            wedge = patches.Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, facecolor=colour, **surface)
             wedge.set(zorder=2, visible=half_angle > 0.0)
             self.arcs.append(wedge)
         self.mark, self.turning = (
@@ -171,10 +172,9 @@ class RingArtists(Instant):
         pairs = zip([*forces, "$Mg$"], [*colours, *colours, ink], strict=True)
         self.names = [self.name_of_force(name, colour) for name, colour in pairs]
         self._draw_scale_bars()
-        surfaces = [(look.arc_colour(k), name) for k, name in enumerate(look.arc_names(len(rig.arcs)), start=1)]
-        surfaces.append((look.on_page(look.REST), "elsewhere"))
+        surfaces.append(("elsewhere", look.on_page(look.REST)))
         #: Entries of a legend for the surfaces and the mark; arrows have their names beside them.
-        self.entries: list[Artist] = [patches.Patch(fc=colour, ec=edge, label=name) for colour, name in surfaces]
+        self.entries: list[Artist] = [patches.Patch(fc=colour, ec=edge, label=name) for name, colour in surfaces]
         angle: dict[str, Any] = {"marker": "v", "color": dark, "linestyle": "", "markersize": 5}
         self.entries.append(lines.Line2D([], [], label="angle θ of the ring", **angle))
         #: Artists that :meth:`show` changes.
