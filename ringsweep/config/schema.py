@@ -46,14 +46,13 @@ def schema() -> dict[str, Any]:
                 if parameter not in meanings:
                     meanings.append(parameter)
     leaves = {path: _any_of([_number(parameter) for parameter in meanings]) for path, meanings in known.items()}
+    joins = INTERPOLATIONS.items()
+    law_by_formula = _section({"mu": _formula(), "at_rest": _at_rest()}, "mu")
     scene = _nest(
         {
             "model": _names(MODELS, "what moves"),
             LAW: _laws("friction law; may be missing where sweep goes through laws"),
-            "friction.laws": _open(
-                "friction laws by formula: name -> mu, at_rest",
-                _section({"mu": _formula(), "at_rest": _at_rest()}, "mu"),
-            ),
+            "friction.laws": _open("friction laws by formula: name -> mu, at_rest", law_by_formula),
             "friction.mu": _any_of([_formula(), _list(_number(TABLES["friction"]["mu"]))]),
             "friction.at_rest": _at_rest(),
             "friction.v": _list(_number(TABLES["friction"]["v"])),
@@ -62,18 +61,8 @@ def schema() -> dict[str, Any]:
             "initial.from": _text("result file of the run on the belt that goes on"),
             "drive.file": _text("CSV file with columns t (s), theta (rad)"),
             "force.file": _text("CSV file with columns t (s), force (N)"),
-            **{
-                f"{section}.{name}": _list(_number(parameter))
-                for section in ("drive", "force")
-                for name, parameter in TABLES[section].items()
-            },
-            **{
-                f"{section}.interpolate": {
-                    "description": "what joins the rows of the table",
-                    "oneOf": _constants(names),
-                }
-                for section, names in INTERPOLATIONS.items()
-            },
+            **{f"{of}.{name}": _list(_number(p)) for of in ("drive", "force") for name, p in TABLES[of].items()},
+            **{f"{of}.interpolate": _word("what joins the rows of the table", names) for of, names in joins},
             "drive.theta": _any_of([_formula("angle or displacement", TIME), _list(_number(TABLES["drive"]["theta"]))]),
             "force.formula": _formula("force on the body, N,", TIME),
             **leaves,
@@ -158,8 +147,8 @@ def _open(about: str, values: dict[str, Any], **rest: Any) -> dict[str, Any]:
     return {"description": about, "type": "object", **rest, "additionalProperties": values}
 
 
-def _list(items: dict[str, Any], **rest: Any) -> dict[str, Any]:
-    return {"type": "array", "items": items, "minItems": 1, **rest}
+def _list(items: dict[str, Any], about: str = "", **rest: Any) -> dict[str, Any]:
+    return ({"description": about} if about else {}) | {"type": "array", "items": items, "minItems": 1, **rest}
 
 
 def _text(about: str) -> dict[str, Any]:
@@ -170,16 +159,23 @@ def _any_of(options: list[dict[str, Any]]) -> dict[str, Any]:
     return options[0] if len(options) == 1 else {"anyOf": options}
 
 
+def _either(about: str, *options: Mapping[str, Any]) -> dict[str, Any]:
+    return {"description": about, "anyOf": list(options)}
+
+
+def _word(about: str, meanings: Mapping[str, str]) -> dict[str, Any]:
+    return {"description": about, "oneOf": _constants(meanings)}
+
+
 def _constants(meanings: Mapping[str, str]) -> list[dict[str, str]]:
     return [{"const": name, "description": meaning} for name, meaning in meanings.items()]
 
 
 def _record() -> dict[str, Any]:
-    about = "whether a run tells its Lyapunov exponent and its Floquet multipliers"
-    at = {"description": "instants of the points", "oneOf": _constants(INSTANTS)}
+    at = _word("instants of the points", INSTANTS)
     section = _section({"at": at, "keep": _number(KEEP), "period": _number(PERIOD)}, "at")
     kept = {"description": "points of the motion that a run keeps", **section}
-    exponent = {"description": about, **_FLAG}
+    exponent = {"description": "whether a run tells its Lyapunov exponent and its Floquet multipliers", **_FLAG}
     return {"description": "what a run records", **_section({"exponent": exponent, "section": kept})}
 
 
@@ -192,7 +188,7 @@ def _solver() -> dict[str, Any]:
         for option in dataclasses.fields(method):
             options[option.name] = _number(numbers[option.name]) if option.name in numbers else _FLAG
         methods.append(_section(options, "method"))
-    return {"description": "how time advances", "anyOf": methods}
+    return _either("how time advances", *methods)
 
 
 def _sweep(paths: list[str]) -> dict[str, Any]:
@@ -207,26 +203,22 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
         **{key: _number(parameter) for key, parameter in NUMBERS.items()},
         "also": _text("number that is interpolated where not run"),
         "within": {"description": "largest error of that", **_VALUE},
-        "axes": {"description": "one or two paths that are refined (default: the longest two)"}
-        | _list(names, maxItems=2),
+        "axes": _list(names, "one or two paths that are refined (default: the longest two)", maxItems=2),
     }
     grid = "path -> values; every combination is run; paths with commas between them vary together"
     of_laws = {LAW: laws | {"uniqueItems": True}}
     points = "CSV file whose columns are paths and whose rows are runs, or its columns"
     columns = _open("path -> values", _list(_VALUE), propertyNames=names, properties={LAW: laws})
+    which = "axis along which each cell starts from the state in which the one before ended"
+    followed = _section({"axis": _TEXT, "direction": {"oneOf": _constants(DIRECTIONS)}}, "axis")
+    boundaries = "compute only the boundaries of the map: every 32nd cell, then where neighbours differ"
     return _section(
         {
             "grid": _open(grid, axis, propertyNames=together, properties=of_laws),
-            "refine": {
-                "description": "compute only the boundaries of the map: every 32nd cell, then where neighbours differ",
-                "anyOf": [_FLAG, _section(refined)],
-            },
-            "follow": {
-                "description": "axis along which each cell starts from the state in which the one before ended",
-                "anyOf": [_TEXT, _section({"axis": _TEXT, "direction": {"oneOf": _constants(DIRECTIONS)}}, "axis")],
-            },
+            "refine": _either(boundaries, _FLAG, _section(refined)),
+            "follow": _either(which, _TEXT, followed),
             "sample": _sample(together, axis),
-            "points": {"description": points, "anyOf": [_TEXT, columns]},
+            "points": _either(points, _TEXT, columns),
         }
     )
 
@@ -237,12 +229,10 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
         count, about = len(arguments), f"[{', '.join(arguments)}]"
         kinds[name] = {"description": about, "type": "array", "items": _VALUE, "minItems": count, "maxItems": count}
     columns = {"type": "object", "additionalProperties": _list(_VALUE)}
-    kinds["values"] = {
-        "description": "values, each as probable as the others",
-        "anyOf": [_list(_VALUE), columns],
-    }
+    kinds["values"] = _either("values, each as probable as the others", _list(_VALUE), columns)
     kinds["file"] = _text("CSV file with a column for each path; a row is a draw")
     kinds["over"] = _text("path that the draw is multiplied by")
+    indices = "Sobol indices, and of which variables beside the regimes"
     drawn = "path -> distribution; paths with commas between them are drawn together"
     found = _section(
         {
@@ -251,10 +241,7 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
             "of": _open(drawn, _section(kinds), propertyNames=names, minProperties=1),
             "quantiles": _open("variable -> levels", _list(_VALUE)),
             "survival": {"description": "times at which it is asked whether the contacts still hold", **axis},
-            "sensitivity": {
-                "description": "Sobol indices, and of which variables beside the regimes",
-                "anyOf": [_FLAG, _section({"of": _list(_TEXT)}, "of")],
-            },
+            "sensitivity": _either(indices, _FLAG, _section({"of": _list(_TEXT)}, "of")),
             "keep": {"description": "whether the result holds the runs too", **_FLAG},
         },
         *("n", "of"),
