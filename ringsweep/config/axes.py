@@ -103,23 +103,16 @@ def paths_of(key: Any) -> list[Any]:
 def sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
     """Axes from the section ``sweep`` of a configuration."""
     known = sweepable(scene)
-    points = sweep.get("points", {})
 
     def columns() -> Iterator[Column]:
-        for path, given in points.items():
+        for path, given in sweep.get("points", {}).items():
             where = f"sweep.points.{path}"
             yield path, where, ("point",), read_values(given, swept_parameter(known, path, where), where)
-        seen = set(points)
         for key, given in sweep.get("grid", {}).items():
-            where = f"sweep.grid.{key}"
+            where, read = f"sweep.grid.{key}", read_spacing if isinstance(given, dict) else read_values
             first, *_ = paths = paths_of(key)
             for path in paths:
                 parameter = swept_parameter(known, path, where)
-                if path in seen:
-                    also = "a column of sweep.points" if path in points else "on this or another axis"
-                    raise InputError(where, f"also {also}: a path can vary in one place only")
-                seen.add(path)
-                read = read_spacing if isinstance(given, dict) else read_values
                 yield path, where, (dimension(first),), read(given, parameter, where)
 
     return build_axes(columns())
@@ -197,6 +190,9 @@ def build_axes(columns: Iterable[Column]) -> Axes:
     """
     found = Axes()
     for path, where, dims, values in columns:
+        if path in found.columns:
+            also = "a column of sweep.points" if "point" in found.columns[path][0] else "on this or another axis"
+            raise InputError(where, f"also {also}: a path can vary in one place only")
         for dim, size in zip(dims, values.shape, strict=True):
             if dim in OUTCOMES:
                 raise InputError(where, f"the dimension {dim} has the name of a variable of the result")

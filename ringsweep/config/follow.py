@@ -85,9 +85,8 @@ def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
     if len(dims) > 1:
         raise InputError(where, f"{path} varies along {' and '.join(dims)}: follow a path with one dimension")
     replaced = [f"initial.{name}" for name in ("x", "velocity", "deflection", "phi", "omega")]
-    replaced += ["force.phase", "drive.phase"]
     for other, (along, _) in axes.columns.items():
-        if dims[0] in along and other in (LAW, *replaced):
+        if dims[0] in along and other in (LAW, *replaced, "force.phase", "drive.phase"):
             what = "a chain has one law" if other == LAW else "the cell before gives it"
             raise InputError(where, f"{other} varies along {dims[0]} too, but {what}")
     if DIRECTION in axes.sizes:
@@ -140,11 +139,9 @@ def run_to_continue(doc: Document) -> str | None:
     for key in initial:
         raise InputError(f"scene.initial.{key}", "cannot stand beside initial.from, which gives it: leave one out")
     # A configuration could name another file in turn, without end. A result holds the values.
-    if not is_result(doc.folder / name):
-        raise InputError(
-            "scene.initial.from", f"{doc.folder / name} is no result file: `ringsweep run` or `simulate` writes one"
-        )
-    return str(doc.folder / name)
+    if not is_result(file := doc.folder / name):
+        raise InputError("scene.initial.from", f"{file} is no result file: `ringsweep run` or `simulate` writes one")
+    return str(file)
 
 
 def put_state(doc: Document, scene: Scene, file: str, before: Scene, axes: Axes, swept: Any) -> None:

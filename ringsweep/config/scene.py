@@ -85,8 +85,11 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         raise InputError(f"scene.{LAW}", f"missing: name a friction law: {', '.join(law_choice(model, own).names)}")
     if section is not None:
         section = section._replace(deflections=any(family_of({**LAWS, **own}[law]) is Dynamic for law in names))
-    arcs = _arcs(scene, zones, leaves)
-    moved = replace(moved, exponent=exponent, section=section, arcs=arcs, **_read_tables(doc, scene, moved))
+    moved = replace(moved, exponent=exponent, section=section, arcs=_arcs(scene, zones, leaves))
+    if moved.drive == "table":
+        moved = replace(moved, table=read_samples(doc, scene["drive"], "drive"))
+    if any(f"force.{name}" in leaves for name in (*TABLES["force"], "file", "interpolate")):
+        moved = replace(moved, force=read_samples(doc, scene["force"], "force"))
     structures = {
         law: replace(moved, law=law, own_law=own.get(law), curve=curve if law == TABLE_LAW else None) for law in names
     }
@@ -159,16 +162,6 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
 
 def _takes_force(model: str) -> bool:
     return "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws))))
-
-
-def _read_tables(doc: Document, scene: dict[str, Any], moved: Structure) -> dict[str, Any]:
-    """Tables of the drive and of the force, as fields of the structure."""
-    force = scene.get("force")
-    measured = force is not None and any(name in force for name in (*TABLES["force"], "file", "interpolate"))
-    return {
-        "table": read_samples(doc, scene["drive"], "drive") if moved.drive == "table" else None,
-        "force": read_samples(doc, scene["force"], "force") if measured else None,
-    }
 
 
 def _read_numbers(

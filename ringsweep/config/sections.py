@@ -84,12 +84,10 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
         raise InputError(where, f"a list of values is expected, got {show(given)}")
     if not given:
         raise InputError(where, "empty: give at least one value")
-    read: Any = _read_name if isinstance(parameter, Choice) else quantity
-    return np.array([read(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
-
-
-def _read_name(given: object, choice: Choice, path: str) -> str:
-    return one_of(given, choice.names, path, f"is not a {choice.long_name}")
+    if isinstance(parameter, Choice):
+        problem = f"is not a {parameter.long_name}"
+        return np.array([one_of(name, parameter.names, f"{where}.{i}", problem) for i, name in enumerate(given)])
+    return np.array([quantity(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
 
 
 def section_of(parent: dict[str, Any], key: str, prefix: str) -> dict[str, Any]:
