@@ -1,5 +1,9 @@
 """Belts of one kind: tests whose claims do not depend on the parts of a belt share one kernel for each law."""
 
+import numpy as np
+
+import ringsweep
+
 
 def on_belt(
     friction, stiffness=1.0, *, mass=1.0, cubic=None, damping=None, velocity=None, gravity=None, force=None,
@@ -29,3 +33,19 @@ def with_all_parts(scene):
     # A force without a frequency has no period, and leaves the motion a free one.
     force = {"amplitude": 0.0, "frequency": 0.0} | scene.get("force", {})
     return scene | {"spring": spring, "damper": damper, "force": force}
+
+
+def outcome(scene, solver=None, **options):
+    """Outcomes of one run."""
+    method = {"method": "auto"} | (solver or {}) | options
+    return ringsweep.sweep(scene, {"time.span": [scene["time"]["span"]]}, solver=method, progress=False).isel(
+        time_span=0
+    )
+
+
+def with_exponent(scene, points=None, exponent=True, certify=False):
+    """Outcomes with the largest Lyapunov exponent; `points` are columns of values by path."""
+    config = {"scene": scene, "record": {"exponent": exponent}, "solver": {"method": "auto", "certify": certify}}
+    if points is not None:
+        config["sweep"] = {"points": {path: np.asarray(column).tolist() for path, column in points.items()}}
+    return ringsweep.run(config, jobs=1, progress=False)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from belts import on_belt, with_all_parts
+from belts import on_belt, outcome, with_all_parts
 from tiers import mostly_slow
 
 import ringsweep
@@ -26,12 +26,6 @@ def belt(law="stiction", *, m=1.0, k=2.0, v_b=0.1, mu_s=0.15, mu_k=0.1, span=60.
     scene = on_belt(friction, k, mass=m, velocity=v_b, span=span, start=(0.0, v_b if start is None else start))
     # The kernels of these laws for a belt with all parts are compiled in any case, for forces on the body.
     return with_all_parts(scene) if law in ("karnopp", "bengisu-akay") else scene
-
-
-def outcome(scene, **solver):
-    return ringsweep.sweep(
-        scene, {"time.span": [scene["time"]["span"]]}, solver={"method": "auto", **solver}, progress=False
-    ).isel(time_span=0)
 
 
 class TestStickSlipCycle:

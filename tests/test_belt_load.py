@@ -4,6 +4,7 @@ from math import acos, atan2, copysign, pi, sqrt
 
 import numpy as np
 import pytest
+from belts import outcome
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -27,11 +28,6 @@ def scene(law="stiction", *, growth=8.0, v_b=0.1, start=None, span=20.0, **frict
         "initial": {"x": x, "velocity": velocity},
         "time": {"span": span},
     }
-
-
-def outcome(scene, solver=None):
-    axes = {"time.span": [scene["time"]["span"]]}
-    return ringsweep.sweep(scene, axes, solver=solver or {"method": "auto"}, progress=False).isel(time_span=0)
 
 
 def word(found):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from belts import on_belt, with_all_parts
+from belts import on_belt, with_all_parts, with_exponent
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -27,15 +27,8 @@ FREE = BODY | {
 }
 
 
-def run(scene, points=None, exponent=True, certify=False):
-    """Outcomes of a scene; `points` are columns of values by path."""
-    config = {
-        "scene": with_all_parts(scene),
-        "record": {"exponent": exponent},
-        "solver": {"method": "auto", "certify": certify},
-        **({} if points is None else {"sweep": {"points": {k: np.asarray(v).tolist() for k, v in points.items()}}}),
-    }
-    return ringsweep.run(config, jobs=1, progress=False)
+def run(scene, points=None, *options, **more):
+    return with_exponent(with_all_parts(scene), points, *options, **more)
 
 
 def test_multipliers_of_den_hartog_without_stops():

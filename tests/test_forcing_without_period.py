@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from belts import on_belt, with_all_parts
+from belts import on_belt, with_all_parts, with_exponent
 
 import ringsweep
 from ringsweep.physics import drives
@@ -41,12 +41,6 @@ _DIMENSIONS = {
     "time.span": (0, 0, 1),
     "gravity": (0, 1, -2),
 }
-
-
-def run(scene, points=None, exponent=True, certify=False):
-    config = {"scene": scene, "record": {"exponent": exponent}, "solver": {"method": "auto", "certify": certify}}
-    sweep = {} if points is None else {"sweep": {"points": {path: column.tolist() for path, column in points.items()}}}
-    return ringsweep.run(config | sweep, jobs=1, progress=False)
 
 
 def of_table(friction, tmp_path):
@@ -97,7 +91,7 @@ def test_period_of_parts_that_repeat_and_of_parts_that_do_not():
 @pytest.mark.slow
 def test_exponent_under_a_table_is_the_slower_rate_of_a_damped_oscillator(tmp_path):
     """Without friction disturbances decay like exp((sqrt(3) - 2) t) and exp(-(sqrt(3) + 2) t)."""
-    found = run(of_table({"law": "coulomb", "mu_k": 0.0}, tmp_path), certify=True)
+    found = with_exponent(of_table({"law": "coulomb", "mu_k": 0.0}, tmp_path), certify=True)
     assert found.certified.item() == 1
     assert found.lyapunov.item() == pytest.approx(sqrt(3.0) - 2.0, abs=1e-9)
     assert np.isnan([found[name].item() for name in ("period", "multiplier_1", "multiplier_2")]).all()
@@ -109,8 +103,8 @@ def test_exponent_under_a_table_is_the_slower_rate_of_a_damped_oscillator(tmp_pa
 def test_exponent_of_stick_slip_under_a_table_is_that_under_the_same_sine(tmp_path):
     """Stick erases one disturbance of two; that of x outlives the stop, and its growth is finite."""
     friction = {"law": "coulomb", "mu_k": 0.02}
-    table = run(of_table(friction, tmp_path))
-    sine = run(DAMPED | {"friction": friction, "force": {"amplitude": 1.0, "frequency": 0.1}})
+    table = with_exponent(of_table(friction, tmp_path))
+    sine = with_exponent(DAMPED | {"friction": friction, "force": {"amplitude": 1.0, "frequency": 0.1}})
     assert sine.stops_per_cycle.item() == 2.0
     assert sine.lyapunov.item() == pytest.approx(np.log(sine.multiplier_1.item()) / 10.0, rel=1e-12)
     assert table.lyapunov.item() == pytest.approx(sine.lyapunov.item(), abs=3.0 * table.lyapunov_error.item())
@@ -123,7 +117,7 @@ def test_exponent_of_stick_slip_under_a_table_is_that_under_the_same_sine(tmp_pa
 def test_words_under_two_incommensurate_forces_have_no_units_and_no_side():
     points = random_points(40, 5)
     signed = "belt.velocity", "initial.x", "initial.velocity", "force.A", "force.B"
-    found = run(TWO_FORCES, points, certify=True)
+    found = with_exponent(TWO_FORCES, points, certify=True)
     assert {"quasi-periodic", "transient"} <= set(ringsweep.words(found.long_run).values.tolist())
     assert found.period.isnull().all()
     assert found.multiplier_1.isnull().all()
@@ -139,7 +133,7 @@ def test_words_under_two_incommensurate_forces_have_no_units_and_no_side():
         "longer": points | {"time.span": 4.3 * points["time.span"]},
     }
     for name, changed in changes.items():
-        other = run(TWO_FORCES, changed, certify=True)
+        other = with_exponent(TWO_FORCES, changed, certify=True)
         same = (found.certified.values == 1) & (other.certified.values == 1)
         same &= (found.settled.values == 1) | (name != "longer")
         assert same.sum() >= 20
@@ -156,7 +150,7 @@ def test_body_that_a_fading_force_has_left_stuck_rests():
     force = {"formula": "A*exp(-t/tau)*sin(w*t)", "A": 5.0, "tau": 5.0, "w": 1.0}
     fading = DAMPED | {"friction": {"law": "coulomb", "mu_k": 0.1}, "force": force, "damper": {"coefficient": 0.1}}
     spans = np.array([15.0, 100.0, 1000.0])
-    found = run(fading, {"time.span": spans}, exponent=False)
+    found = with_exponent(fading, {"time.span": spans}, exponent=False)
     assert ringsweep.words(found.regime).values.tolist() == ["oscillatory", "sticking", "sticking"]
     assert ringsweep.words(found.long_run).values.tolist() == ["transient", "rest", "rest"]
     assert found.period.isnull().all()
@@ -164,6 +158,6 @@ def test_body_that_a_fading_force_has_left_stuck_rests():
 
 def test_amplitude_zero_leaves_a_motion_free():
     free = with_all_parts(DAMPED | {"damper": {"coefficient": 0.0}, "initial": {"x": 1.0, "velocity": 0.0}})
-    found = run(free | {"force": {"amplitude": 0.0, "frequency": 0.3}})
+    found = with_exponent(free | {"force": {"amplitude": 0.0, "frequency": 0.3}})
     assert ringsweep.words(found.long_run).item() == "periodic"
     assert found.period.item() == pytest.approx(2.0 * np.pi, rel=1e-9)
