@@ -11,7 +11,7 @@ import ringsweep
 from ringsweep import plots
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.runs import sweep
+from ringsweep.runs.plans import plan_of
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,8 @@ def test_accessor_is_there_for_a_file_that_xarray_alone_has_opened(imports):
 def mapped(scene, axes, points=False):
     """Dataset of a sweep without computing it."""
     config = load({"scene": scene, "sweep": {"points" if points else "grid": axes}})
-    coords, attrs = sweep._coordinates_and_attributes(config, None)
+    plan = plan_of(config)
+    coords, attrs = plan.coordinates(), plan.attributes()
     return xr.Dataset(coords=coords, attrs=attrs)
 
 

@@ -14,6 +14,7 @@ from ringsweep.quantities.flags import FAILED
 from ringsweep.runs import needs
 from ringsweep.runs.cells import TaskResult
 from ringsweep.runs.executors import Execution
+from ringsweep.runs.plans import plan_of
 from ringsweep.runs.sweep import write
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint
@@ -102,7 +103,7 @@ def test_sweep_that_does_not_fit_is_refused_before_its_first_cell(sweep, tmp_pat
     else:
         monkeypatch.setattr(needs, "memory_of_machine", lambda: 1e6)
         message = "the grid needs 300 MB of memory, and this machine has 1 MB"
-    monkeypatch.setattr("ringsweep.runs.sweep.compute_task", None)
+    monkeypatch.setattr("ringsweep.runs.grid.compute_task", None)
     monkeypatch.setattr(needs, "compute_task", None)
     assert cli.main(["run", sweep(8), *["--dry-run"] * dry]) == 2
     assert message in capsys.readouterr().err
@@ -117,7 +118,7 @@ def test_sweep_in_memory_that_does_not_fit_is_refused(scene, monkeypatch):
 
 def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, tmp_path, monkeypatch):
     config = load(sweep(8))
-    room = 64 * needs.bytes_of_cell(config)
+    room = 64 * plan_of(config).bytes_of_cell()
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=room))
     put = Checkpoint.put
 
@@ -132,7 +133,7 @@ def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, t
         patch.setattr(Checkpoint, "put", full)
         with pytest.raises(OSError, match="No space"):
             write(config, tmp_path / "a.nc", Execution(progress=False))
-    room = 63 * needs.bytes_of_cell(config)
+    room = 63 * plan_of(config).bytes_of_cell()
     assert write(config, tmp_path / "a.nc", Execution(progress=False))
 
 
@@ -140,7 +141,7 @@ def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, t
 def test_columns_take_no_more_bytes_than_planned(scene, solver):
     config = {"scene": scene, "solver": solver, "sweep": {"grid": {"drive.amplitude": [0.5, 2.0]}}}
     found = ringsweep.run(config, progress=False)
-    bytes_of_cell = needs.bytes_of_cell(load(config))
+    bytes_of_cell = plan_of(load(config)).bytes_of_cell()
     taken = sum(variable.dtype.itemsize for variable in found.data_vars.values())
     assert taken <= bytes_of_cell <= taken + 8
 
@@ -207,4 +208,4 @@ PEAKS = {512: 354e6, 1024: 465e6, 2048: 505e6, 4096: 892e6}
 
 @pytest.mark.parametrize("side", PEAKS)
 def test_memory_that_is_told_is_what_a_refined_map_took(sweep, side):
-    assert 0.95 < needs.memory_needed(with_refine(load(sweep(side)), True), False) / PEAKS[side] < 1.25
+    assert 0.95 < needs.memory_needed(plan_of(with_refine(load(sweep(side)), True)), False) / PEAKS[side] < 1.25

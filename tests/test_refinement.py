@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
-from ringsweep.runs.refinement import Answer, largest_number, refine
+from ringsweep.runs.decisions import Answer, largest_number, refine
 
 SIZE = 257
 

@@ -82,7 +82,7 @@ def by_threads(scene, tmp_path_factory):
 def test_workers_that_joblib_is_told_to_use_give_the_same_bits(scene, by_threads, tmp_path, monkeypatch, backend):
     axes, path = by_threads
     monkeypatch.setattr(TaskSizes, "max_cells", 4)
-    monkeypatch.setattr("ringsweep.runs.sweep.compute_task", _named_by_process())
+    monkeypatch.setattr("ringsweep.runs.grid.compute_task", _named_by_process())
     put, processes = Checkpoint.put, set()
 
     def noted(self, positions, columns, process):

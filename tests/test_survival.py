@@ -183,7 +183,7 @@ class TestContinuation:
         command = ["run", str(config), "-o", str(target), "--jobs", jobs]
         with monkeypatch.context() as patch:
             patch.setattr("ringsweep.runs.sweep.stop_on_interrupt", watched)
-            patch.setattr("ringsweep.runs.sweep.compute_task", endless)
+            patch.setattr("ringsweep.runs.grid.compute_task", endless)
             assert cli.main(command) == 128 + number
         ended.set()
         assert "are done (Ctrl-C again: stop now" in caplog.text
@@ -200,7 +200,8 @@ class TestContinuation:
             os.kill(os.getpid(), signal.SIGINT)
             return replace(compute_task(*arguments), seconds=None)
 
-        monkeypatch.setattr("ringsweep.runs.sweep.compute_task", interrupted)
+        monkeypatch.setattr("ringsweep.runs.grid.compute_task", interrupted)
+        monkeypatch.setattr("ringsweep.runs.task_sizes._known", {})
         assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc"), "--jobs", "1"]) == 130
         assert "stopping when compilation and the first cells are done" in caplog.text
 

@@ -48,12 +48,8 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep init --model ring-single-contact
         """)  # fmt: skip
     init.add_argument("config", nargs="?", default="my-sweep.yaml", metavar="NEW.yaml", help="default: my-sweep.yaml")
-    init.add_argument(
-        "--model",
-        choices=["ring", "ring-single-contact", "belt"],
-        default="ring",
-        help="what it describes (default: ring)",
-    )
+    models = ["ring", "ring-single-contact", "belt"]
+    _option(init, "--model", "what it describes (default: ring)", choices=models, default="ring")
 
     run = _add_command(commands, "run", run_command, "run a sweep: NetCDF, and a regime map beside it", """
         ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
@@ -66,17 +62,15 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
         """)  # fmt: skip
     run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
-    run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
-    _add_settings(run)
-    run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
-    run.add_argument("--dry-run", action="store_true", help="estimate memory, disk space and time; write nothing")
-    run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run computed")
-    run.add_argument("--reuse", metavar="OLD.nc", help="take cells that this earlier sweep has too")
-    run.add_argument(
-        "--refine", action="store_true", help="compute only the boundaries, audit the rest (see sweep.refine)"
-    )
-    run.add_argument("--backend", choices=["threads", "dask"], help="what computes (default: threads of this machine)")
-    run.add_argument("--scheduler", metavar="ADDRESS", help="address of a Dask scheduler, such as tcp://host:8786")
+    _option(run, "-o --output OUT.nc", "default: the configuration's name, in this folder")
+    _option(run, *_SET, **_LIST)
+    _option(run, *_JOBS, type=whole_number)
+    _option(run, "--dry-run", "estimate memory, disk space and time; write nothing")
+    _option(run, "--fresh", "start over: discard what an earlier run computed")
+    _option(run, "--reuse OLD.nc", "take cells that this earlier sweep has too")
+    _option(run, "--refine", "compute only the boundaries, audit the rest (see sweep.refine)")
+    _option(run, "--backend", "what computes (default: threads of this machine)", choices=["threads", "dask"])
+    _option(run, "--scheduler ADDRESS", "address of a Dask scheduler, such as tcp://host:8786")
 
     draw = _add_command(commands, "map", map_command, "draw a variable of a sweep", """
         ringsweep map my.nc                my.png: the regimes
@@ -87,27 +81,15 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep map my.nc --boundaries separating --tolerance 1e-6
         """)  # fmt: skip
     draw.add_argument("dataset", metavar="OUT.nc")
-    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf, .svg and .html too")
-    draw.add_argument("--x", metavar="DIM", help="coordinate across")
-    draw.add_argument("--y", metavar="DIM", help="coordinate up")
-    draw.add_argument(
-        "--var",
-        metavar="V",
-        help="variable to draw (default: regime, or the place if there is a section along one axis)",
-    )
-    draw.add_argument(
-        "--sel",
-        action="append",
-        default=[],
-        metavar="DIM=VALUE",
-        help="fix a coordinate at its value nearest to VALUE, with --boundaries at VALUE; units allowed",
-    )
-
-    draw.add_argument("--log", action="store_true", help="colours follow the logarithm of the numbers")
-    draw.add_argument("--boundaries", metavar="REGIME", help="locate the boundary of a regime: curves, also as NetCDF")
-    draw.add_argument(
-        "--tolerance", type=positive_number, metavar="T", help="error of these, in SI units (default: 1e-6)"
-    )
+    _option(draw, "-o --output MAP.png", "default: beside OUT.nc; .pdf, .svg and .html too")
+    _option(draw, "--x DIM", "coordinate across")
+    _option(draw, "--y DIM", "coordinate up")
+    _option(draw, "--var V", "variable to draw (default: regime, or the place if there is a section along one axis)")
+    held = "fix a coordinate at its value nearest to VALUE, with --boundaries at VALUE; units allowed"
+    _option(draw, "--sel DIM=VALUE", held, **_LIST)
+    _option(draw, "--log", "colours follow the logarithm of the numbers")
+    _option(draw, "--boundaries REGIME", "locate the boundary of a regime: curves, also as NetCDF")
+    _option(draw, "--tolerance T", "error of these, in SI units (default: 1e-6)", type=positive_number)
 
     threshold = _add_command(commands, "threshold", threshold_command,
         "the value of a number at which a regime begins or ends", """
@@ -116,18 +98,14 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep threshold my.yaml --path friction.rough.mu_k --regime separating --from 0.1 --to 0.5 --tolerance 1e-9
         """)  # fmt: skip
     threshold.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
-    threshold.add_argument("--path", required=True, metavar="PATH", help="the number that varies: drive.amplitude")
-    threshold.add_argument(
-        "--regime", required=True, metavar="REGIME", help="the regime: separating; with impact also: tumbled"
-    )
-    threshold.add_argument("--from", dest="low", metavar="VALUE", help="where to look; default: as the sweep has it")
-    threshold.add_argument("--to", dest="high", metavar="VALUE", help="units allowed")
-    threshold.add_argument("--tolerance", metavar="T", help="largest error (default: 1e-6 of the greatest value)")
-    threshold.add_argument(
-        "--scan", type=whole_number, metavar="N", help="runs in which changes of regime are looked for (default: 128)"
-    )
-    threshold.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
-    _add_settings(threshold)
+    _option(threshold, "--path PATH", "the number that varies: drive.amplitude", required=True)
+    _option(threshold, "--regime REGIME", "the regime: separating; with impact also: tumbled", required=True)
+    _option(threshold, "--from VALUE", "where to look; default: as the sweep has it", dest="low")
+    _option(threshold, "--to VALUE", "units allowed", dest="high")
+    _option(threshold, "--tolerance T", "largest error (default: 1e-6 of the greatest value)")
+    _option(threshold, "--scan N", "runs in which changes of regime are looked for (default: 128)", type=whole_number)
+    _option(threshold, *_JOBS, type=whole_number)
+    _option(threshold, *_SET, **_LIST)
 
     fit = _add_command(commands, "fit", fit_command,
         "fit parameters of a scene to a measured time history", """
@@ -136,16 +114,12 @@ def build_parser() -> argparse.ArgumentParser:
         The first line of run.csv names the columns: t (s), and phi (deg) or x (mm).
         """)  # fmt: skip
     fit.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is fitted")
-    fit.add_argument("--data", required=True, metavar="RUN.csv", help="the measured history")
-    fit.add_argument(
-        "--vary", required=True, metavar="PATHS", help="numbers to fit: PATH or PATH=LOW..HIGH, separated by commas"
-    )
-    fit.add_argument("-o", "--output", metavar="FIT.nc", help="default: the configuration's name with -fit")
-    fit.add_argument(
-        "--start", type=whole_number, default=8, metavar="N", help="minimisations, each from its start (default: 8)"
-    )
-    fit.add_argument("--noise", metavar="S", help="standard deviation of a measurement (default: by the residuals)")
-    _add_settings(fit)
+    _option(fit, "--data RUN.csv", "the measured history", required=True)
+    _option(fit, "--vary PATHS", "numbers to fit: PATH or PATH=LOW..HIGH, separated by commas", required=True)
+    _option(fit, "-o --output FIT.nc", "default: the configuration's name with -fit")
+    _option(fit, "--start N", "minimisations, each from its start (default: 8)", type=whole_number, default=8)
+    _option(fit, "--noise S", "standard deviation of a measurement (default: by the residuals)")
+    _option(fit, *_SET, **_LIST)
 
     simulate = _add_command(commands, "simulate", simulate_command,
         "run once, or under each law of a sweep: history and its picture", """
@@ -154,8 +128,8 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep simulate my.nc --set drive.amplitude=4     the scene of my.nc, with this amplitude
         """)  # fmt: skip
     simulate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
-    simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
-    _add_settings(simulate)
+    _option(simulate, "-o --output RUN.nc", "default: the configuration's name with -run")
+    _option(simulate, *_SET, **_LIST)
 
     plot = _add_command(commands, "plot", plot_command, "draw a stored run, or stored errors against run time", """
         ringsweep plot my-run.nc           my-run.png: the time history
@@ -164,23 +138,17 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep plot my-run.nc --kind friction --law lugre
         ringsweep plot uncertain.nc --kind sensitivity --word separating --sel drive.amplitude=2
         """)  # fmt: skip
-    plot.add_argument(
-        "dataset", metavar="RUN.nc", help="what ringsweep simulate or precision wrote, or a sampled sweep"
-    )
-    plot.add_argument("-o", "--output", metavar="RUN.png", help="default: beside RUN.nc; .pdf and .svg too")
-    plot.add_argument(
-        "--kind",
-        choices=["phase", "friction", "probability", "survival", "sensitivity"],
-        help="phase portrait, or friction force over sliding velocity (belt), in place of the time history; "
-        "of a sampled sweep probabilities (default), survival, or Sobol indices",
-    )
-    plot.add_argument("--sel", action="append", default=[], metavar="DIM=VALUE", help="cell of a sampled sweep")
-    plot.add_argument("--word", metavar="REGIME", help="regime whose Sobol indices are drawn")
-    plot.add_argument("--law", metavar="LAW", help="the run under this friction law, if RUN.nc has several")
-    plot.add_argument("--from", type=instant, dest="begin", metavar="T", help="draw the history from this time on")
-    plot.add_argument(
-        "--to", type=instant, dest="end", metavar="T", help="draw the history up to this time; units allowed"
-    )
+    stored = "what ringsweep simulate or precision wrote, or a sampled sweep"
+    plot.add_argument("dataset", metavar="RUN.nc", help=stored)
+    _option(plot, "-o --output RUN.png", "default: beside RUN.nc; .pdf and .svg too")
+    kinds = "phase portrait, or friction force over sliding velocity (belt), in place of the time history; "
+    kinds += "of a sampled sweep probabilities (default), survival, or Sobol indices"
+    _option(plot, "--kind", kinds, choices=["phase", "friction", "probability", "survival", "sensitivity"])
+    _option(plot, "--sel DIM=VALUE", "cell of a sampled sweep", **_LIST)
+    _option(plot, "--word REGIME", "regime whose Sobol indices are drawn")
+    _option(plot, "--law LAW", "the run under this friction law, if RUN.nc has several")
+    _option(plot, "--from T", "draw the history from this time on", type=instant, dest="begin")
+    _option(plot, "--to T", "draw the history up to this time; units allowed", type=instant, dest="end")
 
     animate = _add_command(commands, "animate", animate_command, "run once: film of the body", """
         ringsweep animate my.yaml          my-run.gif
@@ -188,10 +156,8 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep animate my.nc -o run.html  a page with buttons, for the scene of my.nc
         """)  # fmt: skip
     animate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
-    animate.add_argument(
-        "-o", "--output", metavar="RUN.gif", help="default: the configuration's name with -run; .mp4 and .html too"
-    )
-    _add_settings(animate)
+    _option(animate, "-o --output RUN.gif", "default: the configuration's name with -run; .mp4 and .html too")
+    _option(animate, *_SET, **_LIST)
 
     precision = _add_command(commands, "precision", precision_command,
         "measure error against run time, and recommend a solver", """
@@ -199,15 +165,11 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep precision my.yaml --target 1e-9 --cells 64
         """)  # fmt: skip
     precision.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is taken")
-    precision.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name with -precision")
-    precision.add_argument(
-        "--target",
-        type=positive_number,
-        metavar="E",
-        help="largest error allowed: rad or m at the end, s at separation (default: 1e-6)",
-    )
-    precision.add_argument("--cells", type=whole_number, metavar="N", help="number of cells to measure (default: 16)")
-    precision.add_argument("--rounds", type=whole_number, metavar="N", help="timings of each setting (default: 3)")
+    _option(precision, "-o --output OUT.nc", "default: the configuration's name with -precision")
+    target = "largest error allowed: rad or m at the end, s at separation (default: 1e-6)"
+    _option(precision, "--target E", target, type=positive_number)
+    _option(precision, "--cells N", "number of cells to measure (default: 16)", type=whole_number)
+    _option(precision, "--rounds N", "timings of each setting (default: 3)", type=whole_number)
 
     info = _add_command(commands, "info", info_command, "print a summary of a result file", "ringsweep info my.nc")
     info.add_argument("dataset", metavar="OUT.nc")
@@ -271,10 +233,23 @@ def _formatter(prog: str) -> argparse.HelpFormatter:
     )
 
 
-def _add_settings(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="PATH=VALUE", help="change a value: drive.amplitude=3"
-    )
+# Options that several commands have.
+_SET = "--set PATH=VALUE", "change a value: drive.amplitude=3"
+_JOBS = "--jobs N", "threads (default: all cores)"
+
+# Of an option that may be repeated.
+_LIST: dict[str, Any] = {"action": "append", "default": []}
+
+
+def _option(parser: argparse.ArgumentParser, spelling: str, summary: str, **more: Any) -> None:
+    """Add an option: its names, and what its value is called, if it has one that is no choice."""
+    names = [word for word in spelling.split() if word.startswith("-")]
+    value = spelling.removeprefix(" ".join(names)).strip()
+    if not value and "choices" not in more:
+        more["action"] = "store_true"
+    if value:
+        more["metavar"] = value
+    parser.add_argument(*names, help=summary, **more)
 
 
 class _Version(argparse.Action):

@@ -15,13 +15,10 @@ import numpy as np
 from ringsweep.config import Config
 from ringsweep.config.axes import values_at
 from ringsweep.errors import InputError
-from ringsweep.models import model_of
 from ringsweep.quantities.flags import FAILED
-from ringsweep.quantities.variables import OUTCOMES
-from ringsweep.runs import probabilities
 from ringsweep.runs.cells import compute_task
-from ringsweep.runs.reuse import EarlierSweep
-from ringsweep.solvers.certificate import with_errors
+from ringsweep.runs.grid import Grid
+from ringsweep.runs.plans import plan_of
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import cells_done
 from ringsweep.storage.chunks import Layout
@@ -41,24 +38,12 @@ _FILE, _COMPRESSED = 40e3, 0.55
 _FEW, _MOST, _MEASURING = 1000, 100_000, 0.5
 
 
-def bytes_of_cell(config: Config) -> int:
-    """Size of the columns of a cell, or of its sums; variables that some solvers leave out are counted."""
-    if config.sample is not None:
-        return probabilities.bytes_of_part(config) * config.sample.replicates
-    model = model_of(config.scene.structure)
-    columns = model.columns(config.scene.structure)
-    names = [*(name for name in columns if name not in model.absent), "steps", "certified", "uncertified_because"]
-    bounded = with_errors(model.outcomes) if getattr(config.solver, "certify", False) else ()
-    names += ["stiffness", *(f"{name}_error" for name in bounded)]
-    return sum(np.dtype(OUTCOMES[name].dtype).itemsize for name in names)
-
-
-def check_room(config: Config, cells: int, folder: Path | None) -> None:
+def check_room(plan: Grid, cells: int, folder: Path | None) -> None:
     """Make sure that a sweep fits into the memory, and onto the disk.
 
     Parameters
     ----------
-    config : Config
+    plan : Grid
     cells : int
         Number of cells that are still to be computed.
     folder : Path, optional
@@ -69,24 +54,23 @@ def check_room(config: Config, cells: int, folder: Path | None) -> None:
     InputError
         If it does not fit.
     """
-    needed, there = memory_needed(config, folder is None), memory_of_machine()
+    needed, there = memory_needed(plan, folder is None), memory_of_machine()
     if needed > there:
         raise InputError("sweep", f"the grid needs {size(needed)} of memory, and this machine has {size(there)}")
-    # How many cells a refined sweep runs is not known before.
-    if folder is None or config.refine is not None:
+    if folder is None or plan.at_most:
         return
-    needed, there = float(cells * bytes_of_cell(config)), shutil.disk_usage(folder).free
+    needed, there = float(cells * plan.bytes_of_cell()), shutil.disk_usage(folder).free
     if needed > there:
         raise InputError(
             "sweep", f"{cells} cells need {size(needed)} on the disk, and {size(there)} are free in {folder}"
         )
 
 
-def memory_needed(config: Config, in_memory: bool) -> float:
+def memory_needed(plan: Grid, in_memory: bool) -> float:
     """Bytes of memory that a sweep takes at most."""
-    total = Layout(tuple(config.axes.sizes.values())).total
-    interpolates = config.refine is not None and config.refine.also is not None
-    each = _BOOKKEEPING + _INTERPOLATING * interpolates + (2.0 * bytes_of_cell(config) if in_memory else 0.0)
+    total, refine = plan.grid.total, plan.config.refine
+    interpolates = refine is not None and refine.also is not None
+    each = _BOOKKEEPING + _INTERPOLATING * interpolates + (2.0 * plan.bytes_of_cell() if in_memory else 0.0)
     return _PROCESS + total * each + min(total, _MOST_DRAWN) * _PICTURE
 
 
@@ -112,30 +96,26 @@ def describe(config: Config, target: Path, jobs: int | None, reuse: str | os.Pat
     InputError
         If it fits neither into the memory nor onto the disk.
     """
-    sizes, folder, threads = config.axes.sizes, target.resolve().parent, jobs or joblib.cpu_count()
-    layout, runs, key = Layout(tuple(sizes.values())), 1, fingerprint(identity(config))
-    done = cells_done(target.resolve(), key)
-    if config.sample is not None:
-        done, runs = done // config.sample.replicates, config.sample.n * config.sample.rows
+    plan, folder, threads = plan_of(config, reuse), target.resolve().parent, jobs or joblib.cpu_count()
+    sizes, total, key = plan.config.axes.sizes, plan.grid.total, fingerprint(identity(plan.config))
+    done = cells_done(target.resolve(), key) // plan.parts_of_cell
     if target.exists():
         with netcdf.open_dataset(target) as ds:
-            done = layout.total if ds.attrs.get("fingerprint") == key else done
-    elif reuse is not None and config.sample is None:
-        earlier = EarlierSweep(reuse, config)
-        config, none = earlier.align_axes(config), np.zeros(layout.total, dtype=bool)
-        done += sum(len(positions) for positions, _ in earlier.shared_cells(config, layout, none, ()))
-    check_room(config, layout.total - done, folder)
-    columns = float(layout.total * bytes_of_cell(config))
-    finished = _FILE + columns * (_COMPRESSED if layout.total >= netcdf.COMPRESSED_FROM else 1.0)
-    left = (layout.total - done) * runs
-    seconds = _seconds_of_run(config) * left / min(threads, left) if left else 0.0
-    most = "at most " if config.refine is not None else ""
-    words = [f"{most}{layout.total}", f"{runs} runs in each" * (runs > 1), f"{done} of them are done" * bool(done)]
+            done = total if ds.attrs.get("fingerprint") == key else done
+    elif plan.earlier is not None:
+        none = np.zeros(total, dtype=bool)
+        done += sum(len(positions) for positions, _ in plan.earlier.shared_cells(plan.config, plan.grid, none, ()))
+    check_room(plan, total - done, folder)
+    columns, left = float(total * plan.bytes_of_cell()), (total - done) * plan.runs_of_cell
+    finished = _FILE + columns * (_COMPRESSED if total >= netcdf.COMPRESSED_FROM else 1.0)
+    seconds = _seconds_of_run(plan.config) * left / min(threads, left) if left else 0.0
+    most, several = "at most " * plan.at_most, plan.runs_of_cell > 1
+    words = [f"{most}{total}", f"{plan.runs_of_cell} runs in each" * several, f"{done} of them are done" * bool(done)]
     words[0] += f" ({', '.join(f'{name} {length}' for name, length in sizes.items())})" * bool(sizes)
     return "\n".join(
         (
             f"cells: {'; '.join(filter(None, words))}",
-            f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
+            f"memory: some {size(memory_needed(plan, False))} of {size(memory_of_machine())}",
             f"disk: {most}{size(columns + finished)} while it runs, then {most}{size(finished)}"
             f"; {size(shutil.disk_usage(folder).free)} are free in {folder}",
             f"time: {most}about {duration(seconds)} on {threads} threads, once the kernels are compiled",

@@ -1,11 +1,11 @@
-"""Refined sweeps: the cells that decisions ask for are run, and the others get what was inferred."""
+"""Plan of a refined sweep: the cells that decisions ask for are run, and the others get what was inferred."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,18 @@ from ringsweep.config import Config
 from ringsweep.config.refine import Refinement
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED, LABELS, MISSING, OUTCOMES
-from ringsweep.runs.refinement import Answer, Findings, Refined, refine
-from ringsweep.storage.chunks import Layout
+from ringsweep.runs.decisions import Answer, Decided, Findings, refine
+from ringsweep.runs.grid import Chunk, Columns, Grid
+from ringsweep.storage.checkpoint import Checkpoint
+
+if TYPE_CHECKING:
+    from ringsweep.runs.sweep import Work
 
 #: Seed of the audit: a sweep that is repeated audits the same cells.
 SEED = 18
 
 # No classification has as many flags.
 _FLAGS = 13
-
-Columns = dict[str, NDArray[Any]]
 
 
 class KnownLabels:
@@ -67,114 +69,128 @@ class KnownLabels:
         return Answer(self._labels[positions], self._certain[positions], values)
 
 
-def decide(config: Config, layout: Layout, labels: KnownLabels, run: Callable[[NDArray[np.intp]], None]) -> Refined:
-    """Run the cells of a refined sweep, round after round.
+class Refined(Grid):
+    """Plan of a sweep of which only the boundaries of the map are run."""
 
-    Decisions follow from labels alone, so a sweep that was stopped takes the same decisions again.
-
-    Parameters
-    ----------
-    config : Config
-    layout : Layout
-        Order of the cells.
-    labels : KnownLabels
-        What is known; `run` adds to it.
-    run : callable
-        Runs the cells at these positions, which ascend.
-
-    Returns
-    -------
-    Refined
-        Arrays in the shape of the grid.
-    """
-    assert config.refine is not None
-    sizes = config.axes.sizes
-    dims = [*(dim for dim in sizes if dim not in config.refine.dims), *config.refine.dims]
-    grid = tuple(sizes[dim] for dim in dims)
-    rows, columns = [*(sizes[dim] for dim in config.refine.dims), 1][:2]
-    layers = math.prod(grid[: len(grid) - len(config.refine.dims)])
-    asked = config.refine.stride, config.refine.audit
-    decisions = refine((layers, rows, columns), *asked, within=config.refine.within, seed=SEED)
-    order = [dims.index(dim) for dim in sizes]
-    answer = None
-    while True:
-        try:
-            cells = next(decisions) if answer is None else decisions.send(answer)
-        except StopIteration as end:
-            found = end.value
-            break
-        indices = np.unravel_index(cells, grid)
-        positions = layout.positions([indices[k] for k in order])
-        missing = np.sort(positions[~labels.known[positions]])
-        if len(missing):
-            run(missing)
-        answer = labels.at(positions)
-
-    labels_of_grid, origin, level = (
-        array.reshape(grid).transpose(order) for array in (found.labels, found.origin, found.level)
-    )
-    values = None if found.values is None else found.values.reshape(grid).transpose(order)
-    return Refined(labels_of_grid, origin, level, values, found.audit)
-
-
-def complete(config: Refinement, refined: Refined, region: tuple[slice, ...], columns: Columns) -> None:
-    """Fill the inferred cells of a part of the grid, and add what the refinement says of its cells.
-
-    Numbers are missing where a cell is inferred: NaN, or `MISSING` among whole numbers.
-
-    Parameters
-    ----------
-    config : Refinement
-    refined : Refined
-    region : tuple of slice
-        The part of the grid.
-    columns : dict of str to ndarray
-        Columns in the shape of the part.
-    """
-    inferred = refined.origin[region] == INFERRED
-    labels = refined.labels[region][inferred]
-    for name, column in columns.items():
-        if name in LABELS:
-            column[inferred] = labels // _FLAGS ** LABELS.index(name) % _FLAGS
-        elif name == config.also and refined.values is not None:
-            column[inferred] = refined.values[region][inferred]
-        else:
-            column[inferred] = np.nan if column.dtype.kind == "f" else MISSING
-    columns["origin"], columns["level"] = refined.origin[region], refined.level[region]
-
-
-def gaps(names: Iterable[str]) -> list[str]:
-    """Columns of whole numbers that are missing where a cell is inferred."""
-    return [
-        name for name in names if OUTCOMES[name].dtype.startswith("int") and name not in (*LABELS, "origin", "level")
+    at_most = True
+    gaps: ClassVar[list[str]] = [
+        name
+        for name, variable in OUTCOMES.items()
+        if variable.dtype.startswith("int") and name not in (*LABELS, "origin", "level")
     ]
 
+    def compute(self, work: Work) -> None:
+        """Compute the cells that decisions ask for."""
+        labels = KnownLabels(self.config, self.layout.total)
+        for positions, columns in work.store.finished():
+            labels.put(positions, dict(columns))
+        # Which cells an earlier sweep must give is known at the end: until then its labels are enough.
+        if self.earlier is not None:
+            for positions, columns in self.earlier.shared_cells(self.config, self.layout, labels.known, labels.names):
+                labels.put(positions, columns)
+        work.notice = labels.put
 
-def with_nan(column: NDArray[Any]) -> NDArray[Any]:
+        def run(cells: NDArray[np.intp]) -> None:
+            work.run(cells[:, None])
+            if not labels.known[cells].all():
+                raise KeyboardInterrupt
+
+        with work.begun(None):
+            self._decided = self._decide(labels, run)
+        if self.earlier is not None:
+            needed = np.zeros(self.layout.total, dtype=bool)
+            needed[self.layout.positions(np.nonzero(self._decided.origin != INFERRED))] = True
+            work.take_shared(work.store.done | ~needed)
+
+    def _decide(self, labels: KnownLabels, run: Callable[[NDArray[np.intp]], None]) -> Decided:
+        """Run the cells of a refined sweep, round after round; arrays of the result have the shape of the grid.
+
+        Decisions follow from labels alone, so a sweep that was stopped takes the same decisions again. `run` runs the
+        cells at some positions, which ascend, and adds them to the labels.
+        """
+        asked, sizes = self.asked, self.config.axes.sizes
+        dims = [*(dim for dim in sizes if dim not in asked.dims), *asked.dims]
+        grid = tuple(sizes[dim] for dim in dims)
+        rows, columns = [*(sizes[dim] for dim in asked.dims), 1][:2]
+        layers = math.prod(grid[: len(grid) - len(asked.dims)])
+        decisions = refine((layers, rows, columns), asked.stride, asked.audit, within=asked.within, seed=SEED)
+        order = [dims.index(dim) for dim in sizes]
+        answer = None
+        while True:
+            try:
+                cells = next(decisions) if answer is None else decisions.send(answer)
+            except StopIteration as end:
+                found = end.value
+                break
+            indices = np.unravel_index(cells, grid)
+            positions = self.layout.positions([indices[k] for k in order])
+            missing = np.sort(positions[~labels.known[positions]])
+            if len(missing):
+                run(missing)
+            answer = labels.at(positions)
+
+        def in_grid(array: NDArray[Any]) -> NDArray[Any]:
+            return array.reshape(grid).transpose(order)
+
+        values = None if found.values is None else in_grid(found.values)
+        return Decided(in_grid(found.labels), in_grid(found.origin), in_grid(found.level), values, found.audit)
+
+    def _complete(self, region: tuple[slice, ...], columns: Columns) -> None:
+        """Fill the inferred cells of a part of the grid, and add what the refinement says of its cells.
+
+        Numbers are missing where a cell is inferred: NaN, or `MISSING` among whole numbers.
+        """
+        decided = self._decided
+        inferred = decided.origin[region] == INFERRED
+        labels = decided.labels[region][inferred]
+        for name, column in columns.items():
+            if name in LABELS:
+                column[inferred] = labels // _FLAGS ** LABELS.index(name) % _FLAGS
+            elif name == self.asked.also and decided.values is not None:
+                column[inferred] = decided.values[region][inferred]
+            else:
+                column[inferred] = np.nan if column.dtype.kind == "f" else MISSING
+        columns["origin"], columns["level"] = decided.origin[region], decided.level[region]
+
+    def columns(self, columns: Columns) -> Columns:
+        """Columns of the dataset, from those of the cells that were run."""
+        self._complete(tuple(slice(None) for _ in self.layout.sizes), columns)
+        return columns | {name: _with_nan(columns[name]) for name in columns if name in self.gaps}
+
+    def chunks(self, checkpoint: Checkpoint) -> Iterator[Chunk]:
+        """Slices of each chunk in the grid, and the columns of the file there."""
+
+        def fill(region: tuple[slice, ...], missing: NDArray[np.bool_], columns: Columns) -> bool:
+            self._complete(region, columns)
+            return not (missing & (self._decided.origin[region] != INFERRED)).any()
+
+        return checkpoint.chunks(fill)
+
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the dataset: also what was run, and what the audit says."""
+        audit, total = self._decided.audit, self._decided.origin.size
+        computed = total - int(np.count_nonzero(self._decided.origin == INFERRED))
+        found = super().attributes() | {
+            "cells_computed": computed,
+            "audit_cells": audit.cells,
+            "audit_wrong_before": audit.wrong,
+            "audit_corrected": audit.corrected,
+            "audit_bound": audit.bound,
+            "audit_seed": SEED,
+            "audit": f"{computed} of {total} cells are run ({100 * computed / total:.3g} %), the others are inferred; "
+            + _in_words(audit, self.asked),
+            "refined_dimensions": json.dumps(self.asked.dims),
+        }
+        if audit.far is not None:
+            found |= {"audit_far_before": audit.far, "audit_far_bound": audit.far_bound}
+        return found
+
+
+def _with_nan(column: NDArray[Any]) -> NDArray[Any]:
     """A column of whole numbers as floats with NaN for `MISSING`, in the type in which xarray reads it from a file."""
     floats = column.astype(np.float32 if column.dtype.itemsize <= 2 else np.float64)
     floats[column == MISSING] = np.nan
     return floats
-
-
-def attributes(config: Refinement, refined: Refined) -> dict[str, Any]:
-    """Attributes of a refined dataset: what was run, and what the audit says."""
-    audit, total = refined.audit, refined.origin.size
-    computed = total - int(np.count_nonzero(refined.origin == INFERRED))
-    found = {
-        "cells_computed": computed,
-        "audit_cells": audit.cells,
-        "audit_wrong_before": audit.wrong,
-        "audit_corrected": audit.corrected,
-        "audit_bound": audit.bound,
-        "audit_seed": SEED,
-        "audit": f"{computed} of {total} cells are run ({100 * computed / total:.3g} %), the others are inferred; "
-        + _in_words(audit, config),
-        "refined_dimensions": json.dumps(config.dims),
-    }
-    if audit.far is not None:
-        found |= {"audit_far_before": audit.far, "audit_far_bound": audit.far_bound}
-    return found
 
 
 def _in_words(audit: Findings, config: Refinement) -> str:

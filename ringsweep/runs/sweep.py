@@ -7,8 +7,6 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from threading import Event
 from time import monotonic
@@ -19,25 +17,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, assembled, load, read_axes, read_scene, read_solver, with_refine
-from ringsweep.config.follow import BOTH, DIRECTION
 from ringsweep.config.yaml_text import read
 from ringsweep.errors import InputError
-from ringsweep.models import model_of
-from ringsweep.quantities.variables import INFERRED, OUTCOMES, Variable, error_attribute
-from ringsweep.runs import probabilities
-from ringsweep.runs.cells import TaskResult, compute_task, coordinates, kernels_of
-from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
+from ringsweep.quantities.variables import error_attribute
+from ringsweep.runs.cells import TaskResult, kernels_of
+from ringsweep.runs.executors import Execution, progress_bar, stop_on_interrupt
+from ringsweep.runs.grid import Grid
 from ringsweep.runs.needs import check_room
-from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
-from ringsweep.runs.refined import attributes as refinement_attributes
-from ringsweep.runs.refinement import Refined
-from ringsweep.runs.reuse import EarlierSweep
-from ringsweep.runs.task_sizes import TaskSizes, chains_of, divide_into_tasks
-from ringsweep.runs.warnings import warn_of_results, warn_of_sample
+from ringsweep.runs.plans import plan_of
+from ringsweep.runs.task_sizes import TaskSizes, divide_into_tasks
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, another_sweep, open_checkpoint
-from ringsweep.storage.chunks import Layout
-from ringsweep.storage.provenance import attributes, differences, environment, identity
+from ringsweep.storage.provenance import differences, environment, identity
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -249,49 +240,27 @@ def compute(
     warn: bool = True,
 ) -> xr.Dataset:
     """Run a validated configuration in memory, with or without warnings about the results; see :func:`run`."""
-    config, earlier = _earlier_sweep(config, reuse)
-    layout = _layout(config, whole=True)
+    plan = plan_of(config, reuse, whole=True)
+    layout = plan.layout
     if layout.total > MAX_CELLS_IN_MEMORY:
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
-    check_room(config, layout.total // _parts_of_cell(config), None)
+    check_room(plan, plan.grid.total, None)
     store = MemoryStore(layout.total)
-    found = _Work(config, layout, store, earlier, execution).compute()
+    plan.compute(Work(plan, store, execution))
     columns = {name: column.reshape((*layout.sizes, *column.shape[1:])) for name, column in store.columns.items()}
-    if config.sample is not None:
-        columns = probabilities.statistics(config, columns)
-    elif found is not None and config.refine is not None:
-        complete(config.refine, found, tuple(slice(None) for _ in layout.sizes), columns)
-        columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
-    variables = _variables(config)
+    columns, variables = plan.columns(columns), plan.variables()
     data = {
         name: (
-            (*config.axes.sizes, *variables[name].dims),
+            (*plan.config.axes.sizes, *variables[name].dims),
             column,
             variables[name].attributes | error_attribute(name, columns),
         )
         for name, column in columns.items()
     }
-    results = xr.Dataset(data, *_coordinates_and_attributes(config, found))
+    results = xr.Dataset(data, plan.coordinates(), plan.attributes())
     if warn:
-        _warn(results, config)
+        plan.warn(results)
     return results
-
-
-def _layout(config: Config, whole: bool = False) -> Layout:
-    """Order of the cells of a sweep, or of the parts of the cells of a sampled one; in one chunk for a `whole` one."""
-    if config.sample is not None:
-        return probabilities.part_layout(config, probabilities.grid_layout(config, whole))
-    sizes, section = tuple(config.axes.sizes.values()), config.scene.structure.section
-    return Layout(sizes, sizes if whole else None, 1 if section is None else section.keep)
-
-
-def _variables(config: Config) -> Mapping[str, Variable]:
-    """Declarations of the variables of a sweep."""
-    return model_of(config.scene.structure).variables if config.sample is None else probabilities.variables(config)
-
-
-def _warn(results: xr.Dataset, config: Config) -> None:
-    (warn_of_results if config.sample is None else warn_of_sample)(results, config)
 
 
 def write(
@@ -309,75 +278,52 @@ def write(
     bool
         False if the file held this sweep already.
     """
-    config, earlier = _earlier_sweep(config, reuse)
-    target = target.resolve()
+    plan, target = plan_of(config, reuse), target.resolve()
     if target.exists():
-        netcdf.check_kind(target, *(("regime", "sweep") if config.sample is None else ("probability", "sampled sweep")))
-    layout = _layout(config)
-    with open_checkpoint(target, identity(config), layout, fresh=fresh) as checkpoint:
+        netcdf.check_kind(target, *plan.kind)
+    with open_checkpoint(target, identity(plan.config), plan.layout, fresh=fresh) as checkpoint:
         computed = fresh or not _holds_sweep(target, checkpoint)
         if computed:
             try:
-                _compute_file(_Work(config, layout, checkpoint, earlier, execution), target, checkpoint)
+                _compute_file(Work(plan, checkpoint, execution), target, checkpoint)
             except BaseException as error:
                 with suppress(InputError, OSError):
                     checkpoint.keep()
                 if (finished := int(checkpoint.done.sum())) and checkpoint.folder.exists():
                     again = "the same command without --fresh" if fresh else "the same command"
                     error.add_note(
-                        f"{finished} of {layout.total} {_parts(config)} are kept in {checkpoint.folder}: "
+                        f"{finished} of {plan.layout.total} {plan.parts} are kept in {checkpoint.folder}: "
                         f"{again} goes on"
                     )
                 raise
         if not checkpoint.other:
             checkpoint.clear()
     with netcdf.reading(target) as results:
-        _warn(results, config)
+        plan.warn(results)
     return computed
 
 
-def _parts_of_cell(config: Config) -> int:
-    return 1 if config.sample is None else config.sample.replicates
-
-
-def _parts(config: Config) -> str:
-    return "cells" if config.sample is None else "replicates of cells"
-
-
-def _compute_file(work: _Work, target: Path, checkpoint: Checkpoint) -> None:
+def _compute_file(work: Work, target: Path, checkpoint: Checkpoint) -> None:
     """Compute the cells that the checkpoint lacks, and write the file from it."""
-    config, layout = work.config, work.layout
-    finished = int(checkpoint.done.sum())
-    check_room(config, (layout.total - finished) // _parts_of_cell(config), target.parent)
+    plan, finished = work.plan, int(checkpoint.done.sum())
+    check_room(plan, (plan.layout.total - finished) // plan.parts_of_cell, target.parent)
     if finished:
-        logger.info("going on: %d of %d %s are done", finished, layout.total, _parts(config))
+        logger.info("going on: %d of %d %s are done", finished, plan.layout.total, plan.parts)
     try:
-        _write_file(config, target, layout, checkpoint, work.compute())
+        _write_file(work, target, checkpoint)
     except DamagedTask as damage:
         logger.warning("%s: the missing cells are computed again", damage)
         checkpoint.scan()
-        _write_file(config, target, layout, checkpoint, work.compute())
+        _write_file(work, target, checkpoint)
 
 
-def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint, found: Refined | None) -> None:
-    """Write the file of a sweep whose cells are all in the checkpoint, but for those that were inferred."""
-    coords, attrs = _coordinates_and_attributes(config, found)
-    frame = xr.Dataset(coords=coords, attrs=attrs)
+def _write_file(work: Work, target: Path, checkpoint: Checkpoint) -> None:
+    plan = work.plan
+    plan.compute(work)
+    frame = xr.Dataset(coords=plan.coordinates(), attrs=plan.attributes())
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
-    destination = target, checkpoint.working_folder, frame, _variables(config)
-    if config.sample is not None:
-        chunks = ((region[:-1], probabilities.statistics(config, sums)) for region, sums in checkpoint.chunks())
-        netcdf.write(*destination, probabilities.grid_layout(config), chunks)
-    elif found is None or config.refine is None:
-        netcdf.write(*destination, layout, checkpoint.chunks())
-    else:
-        refine = config.refine
-
-        def fill(region: tuple[slice, ...], missing: NDArray[np.bool_], columns: dict[str, NDArray[Any]]) -> bool:
-            complete(refine, found, region, columns)
-            return not (missing & (found.origin[region] != INFERRED)).any()
-
-        netcdf.write(*destination, layout, checkpoint.chunks(fill), gaps(OUTCOMES))
+    destination = target, checkpoint.working_folder, frame, plan.variables(), plan.grid
+    netcdf.write(*destination, plan.chunks(checkpoint), plan.gaps)
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
@@ -441,137 +387,66 @@ class MemoryStore:
         self.done[positions] = True
 
 
-@dataclass(frozen=True)
-class _Work:
-    """A sweep, the store of its cells, and what fills the store.
+class Work:
+    """A plan that is carried out: its tasks run, and their results are stored.
 
     Attributes
     ----------
-    config : Config
-    layout : Layout
-        Order of the cells, or of the parts of the cells of a sampled sweep.
+    plan : Grid
     store : Checkpoint or MemoryStore
-    earlier : EarlierSweep, optional
-        Sweep whose cells are taken.
-    execution : Execution
-    """
-
-    config: Config
-    layout: Layout
-    store: Checkpoint | MemoryStore
-    earlier: EarlierSweep | None
-    execution: Execution
-
-    def compute(self) -> Refined | None:
-        """Compute the cells that the store lacks, task after task: every cell, or those that a refinement asks for."""
-        if self.config.refine is not None:
-            return self._refine()
-        self._take_shared(self.store.done)
-        if not self.store.done.all():
-            with self._open_tasks(self.layout.total) as tasks:
-                follow, chains = self.config.follow, None
-                if follow is not None:
-                    dim, _ = follow.chains(self.config.axes)
-                    chains = chains_of(self.layout, list(self.config.axes.sizes).index(dim))
-                tasks.run(divide_into_tasks(self.store.done, tasks.sizes, tasks.stopped, chains))
-                if not self.store.done.all():
-                    raise KeyboardInterrupt
-        return None
-
-    def _refine(self) -> Refined:
-        """Compute the cells that a refinement asks for."""
-        labels = KnownLabels(self.config, self.layout.total)
-        for positions, columns in self.store.finished():
-            labels.put(positions, dict(columns))
-        # Which cells an earlier sweep must give is known at the end: until then its labels are enough.
-        if self.earlier is not None:
-            for positions, columns in self.earlier.shared_cells(self.config, self.layout, labels.known, labels.names):
-                labels.put(positions, columns)
-        with self._open_tasks(None) as tasks:
-            tasks.notice = labels.put
-
-            def run(cells: NDArray[np.intp]) -> None:
-                tasks.run(divide_into_tasks(self.store.done, tasks.sizes, tasks.stopped, cells[:, None]))
-                if not labels.known[cells].all():
-                    raise KeyboardInterrupt
-
-            found = decide(self.config, self.layout, labels, run)
-        if self.earlier is not None:
-            needed = np.zeros(self.layout.total, dtype=bool)
-            needed[self.layout.positions(np.nonzero(found.origin != INFERRED))] = True
-            self._take_shared(self.store.done | ~needed)
-        return found
-
-    def _take_shared(self, done: NDArray[np.bool_]) -> None:
-        """Take the cells that are not done from the earlier sweep, as far as there is one that has them."""
-        if self.earlier is None:
-            return
-        taken = 0
-        for positions, columns in self.earlier.shared_cells(self.config, self.layout, done):
-            self.store.put(positions, columns, self.earlier.processors)
-            taken += len(positions)
-        level = logging.INFO if taken else logging.WARNING
-        logger.log(level, "%d of %d cells are taken from %s", taken, self.layout.total, self.earlier.path)
-
-    @contextmanager
-    def _open_tasks(self, total: int | None) -> Iterator[_Tasks]:
-        """Tasks that compute cells; `total` is the number of all, if all of them are computed."""
-
-        def under_way() -> str:
-            learnt = not math.isnan(sizes.seconds_per_cell)
-            return "the tasks under way are done" if learnt else "compilation and the first cells are done"
-
-        config, store, execution = self.config, self.store, self.execution
-        with execution.open() as workers:
-            span = config.scene.values.get("time.span", 1.0)
-            kind = kernels_of(config), config.sample is None, round(math.log2(span))
-            sizes = TaskSizes(1 if config.sample else config.solver.side_by_side, workers.concurrency, kind)
-            # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
-            stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
-            with stopping as stopped, progress_bar(total, execution.progress, int(store.done.sum())) as bar:
-                # Other processes get it with every task: points as they were written are long.
-                sent = replace(config, source={})
-                task: Callable[..., TaskResult] = partial(compute_task, sent, self.layout)
-                if config.sample is not None:
-                    task = partial(probabilities.compute_parts, sent, self.layout)
-                tasks = _Tasks(task, store, workers, sizes, stopped, bar)
-                try:
-                    yield tasks
-                finally:
-                    tasks.store_waiting()
-
-
-class _Tasks:
-    """Runs tasks and stores their results; made by :class:`_Work`.
-
-    Attributes
-    ----------
-    sizes : TaskSizes
-    stopped : Event
-        Set once the user has interrupted.
     notice : callable, optional
         Called with positions and columns of each result; then results of small tasks are stored together.
     """
 
-    def __init__(
-        self, compute: Callable[..., TaskResult], store: Checkpoint | MemoryStore, workers: Executor, sizes: TaskSizes,
-        stopped: Event, bar: Any,
-    ):  # fmt: skip
-        self._compute, self._store, self._workers, self._bar = compute, store, workers, bar
-        self.sizes, self.stopped = sizes, stopped
+    def __init__(self, plan: Grid, store: Checkpoint | MemoryStore, execution: Execution):
+        self.plan, self.store, self._execution = plan, store, execution
         self.notice: Callable[[NDArray[np.integer], dict[str, NDArray[Any]]], None] | None = None
         self._waiting: list[TaskResult] = []
         self._last: TaskResult | None = None
         self._written = monotonic()
 
-    def run(self, tasks: Iterator[NDArray[np.integer]]) -> None:
-        """Run tasks, each given by the positions of its cells."""
-        results = self._workers.results(self._compute, tasks, self.sizes.learn, self.stopped)
+    def take_shared(self, done: NDArray[np.bool_]) -> None:
+        """Take the cells that are not done from the earlier sweep, as far as there is one that has them."""
+        plan, taken = self.plan, 0
+        if plan.earlier is None:
+            return
+        for positions, columns in plan.earlier.shared_cells(plan.config, plan.layout, done):
+            self.store.put(positions, columns, plan.earlier.processors)
+            taken += len(positions)
+        level = logging.INFO if taken else logging.WARNING
+        logger.log(level, "%d of %d cells are taken from %s", taken, plan.layout.total, plan.earlier.path)
+
+    @contextmanager
+    def begun(self, total: int | None) -> Iterator[None]:
+        """Let tasks be run within the block; `total` is the number of all parts, if all of them are computed."""
+
+        def under_way() -> str:
+            learnt = not math.isnan(self._sizes.seconds_per_cell)
+            return "the tasks under way are done" if learnt else "compilation and the first cells are done"
+
+        config, store = self.plan.config, self.store
+        with self._execution.open() as self._workers:
+            span = config.scene.values.get("time.span", 1.0)
+            kind = kernels_of(config), self.plan.parts, round(math.log2(span))
+            self._sizes = TaskSizes(self.plan.side_by_side, self._workers.concurrency, kind)
+            # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
+            stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
+            bar = progress_bar(total, self._execution.progress, int(store.done.sum()))
+            with stopping as self._stopped, bar as self._bar:
+                try:
+                    yield
+                finally:
+                    self._store_waiting()
+
+    def run(self, groups: NDArray[np.integer] | None = None) -> None:
+        """Run tasks of the parts that are not done: of all, or of those in groups that stay together."""
+        tasks = divide_into_tasks(self.store.done, self._sizes, self._stopped, groups)
+        results = self._workers.results(self.plan.task(), tasks, self._sizes.learn, self._stopped)
         try:
             for self._last in results:
                 self._keep(self._last)
         except KeyboardInterrupt as interrupt:
-            self.stopped.set()
+            self._stopped.set()
             # Finished tasks are kept. Tasks under way are not waited for.
             if self._last is not None:
                 self._keep(self._last)
@@ -580,7 +455,7 @@ class _Tasks:
                 self._keep(self._last)
                 self._last = next(results)
         except BaseException:
-            self.stopped.set()
+            self._stopped.set()
             # Tasks under way cannot be interrupted. Wait for their end.
             for _ in results:
                 pass
@@ -591,16 +466,16 @@ class _Tasks:
             changes = differences(environment(), result.environment)
             raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
         if self.notice is None:
-            self._store.put(result.positions, result.columns, result.processor)
+            self.store.put(result.positions, result.columns, result.processor)
         else:
             self.notice(result.positions, result.columns)
             self._waiting.append(result)
             if monotonic() - self._written > _WRITE_INTERVAL:
-                self.store_waiting()
+                self._store_waiting()
         self._bar.update(len(result.positions))
         self._last = None
 
-    def store_waiting(self) -> None:
+    def _store_waiting(self) -> None:
         """Store the results of small tasks together: a file for each would take longer than its cells."""
         waiting, self._waiting = self._waiting, []
         self._written = monotonic()
@@ -611,30 +486,4 @@ class _Tasks:
             columns = {
                 name: np.concatenate([result.columns[name] for result in some])[order] for name in some[0].columns
             }
-            self._store.put(positions[order], columns, processor)
-
-
-def _coordinates_and_attributes(config: Config, found: Refined | None) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Coordinates and attributes of the dataset of a sweep."""
-    coords, attrs = coordinates(config.scene, config.axes.columns), attributes(config)
-    if config.sample is not None:
-        coords |= probabilities.coordinates(config)
-        attrs |= probabilities.attributes(config)
-    if config.refine is not None and found is not None:
-        attrs |= refinement_attributes(config.refine, found)
-    if config.follow is not None and DIRECTION in config.axes.sizes:
-        about = {"long_name": f"direction in which {config.follow.path} is followed"}
-        coords[DIRECTION] = DIRECTION, list(BOTH), about
-    return coords, attrs
-
-
-def _earlier_sweep(config: Config, reuse: str | os.PathLike[str] | None) -> tuple[Config, EarlierSweep | None]:
-    """The configuration, with its axes aligned to those of the earlier sweep, and that sweep."""
-    if reuse is None:
-        return config, None
-    if config.follow is not None:
-        raise InputError("--reuse", "cells of sweep.follow start from the cells before them: leave one of them out")
-    if config.sample is not None:
-        raise InputError("--reuse", "a sampled sweep has no cells that another one could take: leave it out")
-    earlier = EarlierSweep(reuse, config)
-    return earlier.align_axes(config), earlier
+            self.store.put(positions[order], columns, processor)

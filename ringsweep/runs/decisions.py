@@ -78,7 +78,7 @@ class Findings:
 
 
 @dataclass(frozen=True)
-class Refined:
+class Decided:
     """A refined map; arrays have the shape of the grid.
 
     Attributes
@@ -102,7 +102,7 @@ class Refined:
 
 def refine(
     shape: tuple[int, int, int], stride: int, audit: float, *, within: float | None = None, seed: int = 0
-) -> Generator[Cells, Answer, Refined]:
+) -> Generator[Cells, Answer, Decided]:
     """Refine the last two axes of a grid.
 
     Parameters
@@ -125,7 +125,7 @@ def refine(
 
     Returns
     -------
-    Refined
+    Decided
     """
     grid = _Grid(shape, stride, within)
     yield from grid.coarse()
@@ -275,7 +275,7 @@ class _Grid:
         return values
 
 
-def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generator[Cells, Answer, Refined]:
+def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generator[Cells, Answer, Decided]:
     """Compute a sample of the inferred cells, follow what was wrong, and state how much may still be wrong.
 
     One sample is drawn, before anything is known of it, so the bound holds for the labels of that moment. From then on
@@ -311,7 +311,7 @@ def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generato
         all_far = bound(int(far.sum()), int(grid.rough.flat[followed].sum()))
         findings = replace(findings, far=int(far.sum()), far_bound=all_far)
     labels = np.where(grid.labels < 0, ~grid.labels, grid.labels)
-    return Refined(labels, origin, grid.level, grid.values, findings)
+    return Decided(labels, origin, grid.level, grid.values, findings)
 
 
 class _Blocks:
