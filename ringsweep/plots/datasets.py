@@ -106,10 +106,8 @@ def require_history(ds: xr.Dataset) -> xr.Dataset:
         If the dataset has no dimension ``time``, or no instant.
     """
     if not ds.sizes.get("time"):
-        raise InputError(
-            "ds",
-            "has no dimension time: it is not the history of a run; ringsweep map draws a sweep, or plots.regime_map",
-        )
+        draws = "ringsweep map draws a sweep, or plots.regime_map"
+        raise InputError("ds", f"has no dimension time: it is not the history of a run; {draws}")
     return ds.isel(friction_law=0) if ds.sizes.get("friction_law") == 1 else ds
 
 

@@ -186,7 +186,7 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
         look.place_legend(ax, list(ax.get_legend_handles_labels()[0]), handlelength=4)
     else:
         names = next((panel for panel in chain(*datasets.PANELS.values()) if var in panel), (var,))
-        draw_panel(ax, ds, names, explain_shading=True)
+        draw_panel(ax, ds, names, explain=True)
     ax.set_xlabel(axis_label(ds["time"], ds))
     return ax
 
@@ -225,23 +225,17 @@ def _draw_start(axes: Axes, ds: xr.Dataset, first: float, last: float, whole: Ax
     axes.set_xlabel(axis_label(ds["time"], ds))
 
 
-def draw_panel(
-    axes: Axes,
-    ds: xr.Dataset,
-    names: tuple[str, ...],
-    explain_shading: bool = False,
-    band: NDArray[np.intp] | None = None,
-) -> None:
+def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain: bool = False, band: Any = None) -> None:
     """Draw quantities of one run in one panel; those that the dataset does not have are left out.
 
-    The legend explains the shading in the panel that shows where the body is, elsewhere if `explain_shading`. With the
+    The legend explains the shading in the panel that shows where the body is, elsewhere if `explain`. With the
     first samples of cycles as `band` the curves are bands from the least to the greatest value, without shading.
     """
     look.small_ticks(axes)
     time, names = ds["time"].values, tuple(datasets.present(ds, names))
-    first, explain_shading = names[0], explain_shading or names[0] in datasets.PANELS
+    first, explain = names[0], explain or names[0] in datasets.PANELS
     if "mode" in ds and band is None:
-        _shade(axes, time, datasets.phases(ds), explain_shading)
+        _shade(axes, time, datasets.phases(ds), explain)
     if first == "impact_speed":
         _draw_impacts(axes, ds)
     else:
@@ -261,7 +255,7 @@ def draw_panel(
     if first == "impact_speed" or time_limits(ds)[1] > time[-1]:
         axes.set_xlim(*time_limits(ds))
     if first in _CLIPPED:
-        clip(axes, time, displayed(ds[first]).values, "left" if explain_shading else "right")
+        clip(axes, time, displayed(ds[first]).values, "left" if explain else "right")
 
 
 def _cycles(ds: xr.Dataset) -> NDArray[np.intp]:
@@ -361,12 +355,9 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
 
 def _law_style(k: int) -> dict[str, Any]:
     """Line of the `k`-th friction law."""
-    return {
-        "color": look.on_page(look.CURVE_COLOURS[k % len(look.CURVE_COLOURS)]),
-        "linestyle": look.CURVE_STYLES[k % len(look.CURVE_STYLES)],
-        # Where lines coincide, the earlier ones show on both sides of the later ones.
-        "linewidth": max(1.2, 3.0 - 0.6 * k),
-    }
+    colour, style = look.CURVE_COLOURS[k % len(look.CURVE_COLOURS)], look.CURVE_STYLES[k % len(look.CURVE_STYLES)]
+    # Where lines coincide, the earlier ones show on both sides of the later ones.
+    return {"color": look.on_page(colour), "linestyle": style, "linewidth": max(1.2, 3.0 - 0.6 * k)}
 
 
 def _differences(ds: xr.Dataset) -> tuple[float, float] | None:

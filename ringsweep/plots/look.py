@@ -85,7 +85,9 @@ _LETTERS = 1.2
 
 _NO_BREAK = "\N{NO-BREAK SPACE}"
 
-_DARK_PAGE, _LIGHT_INK = "#1E1E1E", "#E8E8E8"
+# Settings that are the colour of the page, and that of all lines and texts.
+_PAGES = ("axes.facecolor", "figure.facecolor")
+_INKS = ("text.color", "axes.labelcolor", "axes.edgecolor", "axes.titlecolor", "xtick.color", "ytick.color")
 
 # Settings of matplotlib by style. A style resets the settings of all others to the defaults of matplotlib.
 _STYLES: dict[str, dict[str, Any]] = {
@@ -98,14 +100,8 @@ _STYLES: dict[str, dict[str, Any]] = {
         # Letters stay letters: publishers refuse fonts of type 3.
         "pdf.fonttype": 42,
     },
-    "dark": {
-        **dict.fromkeys(("figure.facecolor", "axes.facecolor"), _DARK_PAGE),
-        **dict.fromkeys(
-            ("text.color", "axes.labelcolor", "axes.edgecolor", "axes.titlecolor", "xtick.color", "ytick.color"),
-            _LIGHT_INK,
-        ),
-    },
-    "transparent": dict.fromkeys(("figure.facecolor", "axes.facecolor"), "none"),
+    "dark": dict.fromkeys(_PAGES, "#1E1E1E") | dict.fromkeys(_INKS, "#E8E8E8"),
+    "transparent": dict.fromkeys(_PAGES, "none"),
 }
 
 _angles: Literal["deg", "rad"] = "deg"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -52,9 +53,7 @@ class ColourScale:
             return cls(palette, colors.Normalize(*limits))
         meanings = meanings_of(data)
         # The colour of a class does not depend on which other classes occur.
-        colours = [
-            _WORDS.get(m, look.CLASS_COLOURS[k % len(look.CLASS_COLOURS)]) for k, m in enumerate(meanings.values())
-        ]
+        colours = [_WORDS.get(m, colour) for m, colour in zip(meanings.values(), cycle(look.CLASS_COLOURS))]
         classes = colors.BoundaryNorm(np.arange(len(meanings) + 1) - 0.5, len(meanings))
         names = tuple(meaning.replace("_", " ") for meaning in meanings.values())
         return cls(_with_grey(colors.ListedColormap(colours)), classes, np.array(list(meanings)), names)

@@ -18,18 +18,9 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots import labels, look
+from ringsweep.plots import labels, look, map_colours
 from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve, scene_text
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
-from ringsweep.plots.map_colours import (
-    ZERO,
-    CellWarning,
-    ColourScale,
-    cell_warnings,
-    inferred_apart,
-    missing_text,
-    share_text,
-)
 from ringsweep.plots.probability import probability_panel
 from ringsweep.plots.sections import bifurcation, has_circle, has_diagram, multiplier_circle, points_of
 from ringsweep.plots.selection import select
@@ -226,8 +217,10 @@ def map_panel(
     return ax
 
 
+Pair = tuple[str | None, str | None]
+
 #: Warnings of a panel with the cells that have them.
-Warnings = list[tuple[CellWarning, xr.DataArray]]
+Warnings = list[tuple[map_colours.CellWarning, xr.DataArray]]
 
 
 class Map:
@@ -262,15 +255,7 @@ class Map:
         What the title says: the variable, values held, cells left out.
     """
 
-    def __init__(
-        self,
-        ds: xr.Dataset,
-        axes: tuple[str | None, str | None],
-        var: str,
-        sel: Mapping[str, float | str] | None,
-        colours: tuple[str | None, str | None] = (None, None),
-        units: Mapping[str, str] | None = None,
-    ):
+    def __init__(self, ds: xr.Dataset, axes: Pair, var: str, sel: Any, colours: Pair = (None, None), units: Any = None):
         require_sweep(ds)
         ds, sel = labels.in_units(ds, units), sel or {}
         if is_sampled(ds):
@@ -285,8 +270,8 @@ class Map:
         self.ds, held, horizontal, vertical = choose_axes(ds, var, sel, *axes)
         data = labels.displayed(self.ds[var])
         self.scattered = is_scattered(horizontal, vertical)
-        self.scale = ColourScale.of(data, *colours)
-        warnings = cell_warnings(self.ds, data)
+        self.scale = map_colours.ColourScale.of(data, *colours)
+        warnings = map_colours.cell_warnings(self.ds, data)
         along = {*horizontal.dims, *(vertical.dims if vertical else ())}
         self.panels = _panels(self.ds, [str(dim) for dim in data.dims if dim not in along])
         self.columns = math.ceil(math.sqrt(len(self.panels)))
@@ -310,13 +295,13 @@ class Map:
         only = self.panels[0][0] if len(self.panels) == 1 else []
         self.texts = [name, *only, *held, *told, *thinning, *audit]
 
-    def _legend(self, data: xr.DataArray, warnings: list[CellWarning]) -> list[Artist]:
+    def _legend(self, data: xr.DataArray, warnings: list[map_colours.CellWarning]) -> list[Artist]:
         """Entries of the legend for classes, missing values and warnings, each with its share of the cells."""
         entries: list[Artist] = []
 
         def add(where: NDArray[Any], label: str, colour: Any) -> None:
             if where.any():
-                entries.append(patches.Patch(color=colour, label=f"{label}, {share_text(where)}"))
+                entries.append(patches.Patch(color=colour, label=f"{label}, {map_colours.share_text(where)}"))
 
         shown = np.isfinite(data.values)
         if self.scale.flags is not None and self.scale.meanings is not None:
@@ -324,13 +309,13 @@ class Map:
             for k, (flag, meaning) in enumerate(zip(self.scale.flags, self.scale.meanings, strict=True)):
                 add(data.values == flag, meaning, self.scale.colours(k))
         if not shown.all():
-            other = ~shown & ~inferred_apart(self.ds, data).values
-            add(other, missing_text(self.ds, data), look.on_page(look.NO_VALUE))
+            other = ~shown & ~map_colours.inferred_apart(self.ds, data).values
+            add(other, map_colours.missing_text(self.ds, data), look.on_page(look.NO_VALUE))
         if isinstance(self.scale.norm, colors.LogNorm) and self.vertical:
-            add(data.values == 0.0, "exactly 0", ZERO)
+            add(data.values == 0.0, "exactly 0", map_colours.ZERO)
         ink = look.on_page("black")
         for warning in warnings:
-            label = f"{warning.label}, {share_text(warning.cells.values)}"
+            label = f"{warning.label}, {map_colours.share_text(warning.cells.values)}"
             if warning.everywhere:
                 label = warning.label if "certify is" in label else label
                 entries.append(Line2D([], [], linestyle="", label=label))
@@ -452,17 +437,14 @@ class Map:
         self.check_takes_curves()
         for held in swept(self.ds):
             if not held.dims and held.name in boundaries.coords and (boundaries[held.name].values != held.values).any():
-                raise InputError(
-                    "boundaries", f"are those of another map: this one has {labels.plain_text(labels.value_text(held))}"
-                )
+                own = labels.plain_text(labels.value_text(held))
+                raise InputError("boundaries", f"are those of another map: this one has {own}")
         regime, tolerance = boundaries.attrs["boundary_of"], boundaries.attrs["boundary_tolerance"]
         # Along each axis the error is a number in the unit of the axis.
-        along = [self.ds[axis.name] for axis in (self.horizontal, self.vertical) if axis is not None]
-        errors = dict.fromkeys(
-            labels.plain_text(labels.amount_text(axis.copy(data=np.full(axis.shape, tolerance))[0], 2))
-            for axis in along
-        )
-        return Line2D([], [], label=f"boundary of {regime}\n± {' or '.join(errors)}", **_CURVE)
+        along = [self.ds[axis.name][0] for axis in (self.horizontal, self.vertical) if axis is not None]
+        errors = [labels.amount_text(value.astype(float).copy(data=tolerance), 2) for value in along]
+        text = labels.plain_text(" or ".join(dict.fromkeys(errors)))
+        return Line2D([], [], label=f"boundary of {regime}\n± {text}", **_CURVE)
 
     def _draw_line(self, axes: Axes, data: xr.DataArray, index: Mapping[str, int]) -> None:
         """Draw numbers along one axis, with the interval of a probability or a quantile if the dataset has it."""
@@ -530,9 +512,8 @@ class Map:
         """Draw a map of one panel with labels, title, colour bar and legend."""
         if len(self.panels) > 1:
             left = ", ".join(self.panels[0][1])
-            raise InputError(
-                "sel", f"one panel cannot show {left}: hold it, or draw regime_map, which makes a panel for each value"
-            )
+            cure = "hold it, or draw regime_map, which makes a panel for each value"
+            raise InputError("sel", f"one panel cannot show {left}: {cure}")
         self.draw(axes, self.panels[0][1])
         look.label_axes(axes, self.horizontal.label, self.vertical_label)
         bar = self.scale.meanings is None and self.vertical is not None
@@ -573,16 +554,10 @@ def _panels(ds: xr.Dataset, dims: list[str]) -> list[tuple[list[str], dict[str, 
     sizes = [ds.sizes[dim] for dim in dims]
     if math.prod(sizes) > _MOST_PANELS:
         left = ", ".join(f"{dim} ({size})" for dim, size in zip(dims, sizes, strict=True))
-        raise InputError(
-            "sel",
-            f"small multiples over {left} need {math.prod(sizes)} panels, at most {_MOST_PANELS} (5 x 5) fit; "
-            f"hold some of them: --sel {dims[0]}=VALUE",
-        )
-    panels = []
-    for position in np.ndindex(*sizes):
-        index = dict(zip(dims, map(int, position), strict=True))
-        panels.append(([labels.value_text(ds[dim][k]) for dim, k in index.items()], index))
-    return panels
+        need = f"need {math.prod(sizes)} panels, at most {_MOST_PANELS} (5 x 5) fit"
+        raise InputError("sel", f"small multiples over {left} {need}; hold some of them: --sel {dims[0]}=VALUE")
+    places = [dict(zip(dims, map(int, position), strict=True)) for position in np.ndindex(*sizes)]
+    return [([labels.value_text(ds[dim][k]) for dim, k in index.items()], index) for index in places]
 
 
 def _in_contrast(cells: NDArray[Any], colours: NDArray[Any]) -> list[tuple[str, NDArray[np.bool_]]]:

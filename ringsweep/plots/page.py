@@ -254,19 +254,16 @@ def _document(sweep: _Sweep) -> Any:
     from bokeh.layouts import column, row
 
     ds, template = sweep.ds, sweep.ds[sweep.var]
-    columns = {
-        name: _column(ds[name], ds, sweep.whole[name], len(sweep.slices))
-        for name in numeric_names(ds)
-        if set(ds[name].dims) == set(template.dims)
-    }
+    names = [name for name in numeric_names(ds) if set(ds[name].dims) == set(template.dims)]
+    columns = {name: _column(ds[name], ds, sweep.whole[name], len(sweep.slices)) for name in names}
     variables = {name: about for name, (_, about, _) in columns.items()}
     plot = _plot(sweep.horizontal, sweep.vertical)
     bars = {name: _colour_bars(plot, about, colours) for name, (_, about, colours) in columns.items()}
     paint = models.LinearColorMapper(palette=[look.NO_VALUE], nan_color=look.NO_VALUE)
     shown = _points(plot, sweep, paint) if sweep.points is not None else _cells(plot, sweep, paint)
     choice = {"stylesheets": [models.InlineStyleSheet(css=_DARK)], "sizing_mode": "stretch_width"}
-    names = [(name, about["title"]) for name, about in variables.items()]
-    variable = models.Select(title="variable", value=sweep.var, options=names, **choice)
+    titles = [(name, about["title"]) for name, about in variables.items()]
+    variable = models.Select(title="variable", value=sweep.var, options=titles, **choice)
     slices = []
     for dim in sweep.slices:
         options = [(str(k), _slice_text(ds, dim, k)) for k in range(ds.sizes[dim])]
@@ -299,10 +296,8 @@ def _plot(horizontal: Axis, vertical: Axis | None) -> Any:
     from bokeh.plotting import figure
 
     scales = {"x_axis_type": horizontal.scale, "y_axis_type": vertical.scale if vertical else "linear"}
-    names = {
-        "x_axis_label": plain_text(horizontal.label),
-        "y_axis_label": plain_text(vertical.label if vertical else ""),
-    }
+    below, beside = plain_text(horizontal.label), plain_text(vertical.label) if vertical else ""
+    names = {"x_axis_label": below, "y_axis_label": beside}
     tools = {"tools": "pan,wheel_zoom,box_zoom,reset,save", "active_scroll": "wheel_zoom"}
     plot = figure(**scales, **names, **tools, sizing_mode="stretch_both", min_height=360, outline_line_color=None)
     plot.grid.visible = False
@@ -377,11 +372,8 @@ def _cells(plot: Any, sweep: _Sweep, paint: Any) -> dict[str, Any]:
         known["line"] = models.ColumnDataSource({"x": horizontal.values, "value": np.zeros(width, dtype=np.float32)})
         style = {"color": look.CURVE_COLOURS[0], "source": known["line"]}
         known["curve"] = [plot.line("x", "value", **style), plot.scatter("x", "value", size=5, **style)]
-    return known | {
-        "columns": columns.astype(np.int32),
-        "rows": (rows * width).astype(np.int32),
-        "size": width * height,
-    }
+    pixels = {"columns": columns.astype(np.int32), "rows": (rows * width).astype(np.int32)}
+    return known | pixels | {"size": width * height}
 
 
 def _cells_of_pixels(edges: NDArray[Any], scale: str) -> NDArray[np.intp]:

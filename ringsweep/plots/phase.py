@@ -22,6 +22,8 @@ from ringsweep.plots.histories import clip
 from ringsweep.plots.labels import label_axis
 from ringsweep.plots.rig import Rig, belt_history, ring_history
 
+Numbers = NDArray[Any]
+
 # In place of a mode: the velocity jumps.
 _JUMP = 4
 
@@ -140,7 +142,7 @@ def _draw_ring_portrait(ax: Axes, run: xr.Dataset, rig: Rig, relative: bool) -> 
     look.place_legend(ax, entries, bbox_transform=ax.transAxes + room, handleheight=1.2)
 
 
-def _draw_driven(ax: Axes, name: str, across: NDArray[Any], up: NDArray[Any], constant: bool) -> Artist:
+def _draw_driven(ax: Axes, name: str, across: Numbers, up: Numbers, constant: bool) -> Artist:
     """Draw the speed of ring or belt: thin, over the broad curve of the body in stick, which would hide it."""
     style: dict[str, Any] = {"color": look.pair(1), "linewidth": 0.8, "zorder": 2.5, "label": f"speed of the {name}"}
     if not constant:
@@ -149,12 +151,7 @@ def _draw_driven(ax: Axes, name: str, across: NDArray[Any], up: NDArray[Any], co
 
 
 def draw_modes(
-    ax: Axes,
-    mode: NDArray[Any],
-    across: NDArray[Any],
-    up: NDArray[Any],
-    wrapped: bool = False,
-    jumps: NDArray[np.bool_] | None = None,
+    ax: Axes, mode: Numbers, across: Numbers, up: Numbers, wrapped: bool = False, jumps: Numbers | None = None
 ) -> list[Artist]:
     """Draw the curve of a run with a line for each friction mode, its start and its end; returns the legend entries.
 
@@ -194,7 +191,7 @@ def draw_modes(
     return entries
 
 
-def _wrap(angle: NDArray[Any], wrapped: bool) -> NDArray[Any]:
+def _wrap(angle: Numbers, wrapped: bool) -> Numbers:
     """Angles from minus half a turn to half a turn if `wrapped`."""
     return (angle + 0.5 * _turn()) % _turn() - 0.5 * _turn() if wrapped else angle
 
@@ -204,7 +201,7 @@ def _turn() -> float:
     return 2.0 * math.pi * look.angle_unit()[0]
 
 
-def _curve(angle: NDArray[Any], speed: NDArray[Any], wrapped: bool) -> tuple[NDArray[Any], NDArray[Any]]:
+def _curve(angle: Numbers, speed: Numbers, wrapped: bool) -> tuple[Numbers, Numbers]:
     """A curve with NaN wherever its angle jumps by a full turn if `wrapped`."""
     if not wrapped:
         return angle, speed
@@ -213,14 +210,14 @@ def _curve(angle: NDArray[Any], speed: NDArray[Any], wrapped: bool) -> tuple[NDA
     return np.insert(_wrap(angle, True), jumps, np.nan), np.insert(speed, jumps, np.nan)
 
 
-def _segments(kept: NDArray[Any], angle: NDArray[Any], speed: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+def _segments(kept: Numbers, angle: Numbers, speed: Numbers) -> tuple[Numbers, Numbers]:
     """Parts of a curve with NaN between them; `kept`, shape ``(samples - 1,)``, says from which sample to the next."""
     pieces = [np.append(np.arange(i, j + 1), -1) for i, j in look.true_ranges(kept)]
     index = np.concatenate([*pieces, np.array([-1])])
     return np.where(index < 0, np.nan, angle[index]), np.where(index < 0, np.nan, speed[index])
 
 
-def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[Artist]:
+def _draw_bands(ax: Axes, rig: Rig, angle: Numbers, wrapped: bool) -> list[Artist]:
     """Draw bands where a contact is on a zone, in all turns shown; returns their legend entries."""
     low, high = (-0.5 * _turn(), 0.5 * _turn()) if wrapped else (float(angle.min()), float(angle.max()))
     margin = 0.0 if wrapped else 0.05 * (high - low) or _turn() / 72.0
@@ -250,9 +247,7 @@ def _every_turn(left: float, right: float, low: float, high: float) -> Iterator[
             yield a, b
 
 
-def _draw_broad_lines(
-    ax: Axes, run: xr.Dataset, angle: NDArray[Any], speed: NDArray[Any], wrapped: bool
-) -> list[Artist]:
+def _draw_broad_lines(ax: Axes, run: xr.Dataset, angle: Numbers, speed: Numbers, wrapped: bool) -> list[Artist]:
     """Draw a broad line under the curve where a contact is on a zone; returns the legend entries."""
     arcs = np.array([run[name].values for name in zones(run)])
     entries: list[Artist] = []
@@ -330,7 +325,7 @@ def friction_loop(
     return ax
 
 
-def _draw_near_zero(ax: Axes, mode: NDArray[Any], velocity: NDArray[Any], force: NDArray[Any]) -> None:
+def _draw_near_zero(ax: Axes, mode: Numbers, velocity: Numbers, force: Numbers) -> None:
     """Draw small velocities, at which bristles make loops, as an inset where friction, which opposes slip, never is."""
     width = _NEAR * float(np.nanmax(np.abs(velocity)))
     inset = ax.inset_axes((0.6, 0.24, 0.37, 0.36))

@@ -151,9 +151,8 @@ class RingArtists(Instant):
             wedge = patches.Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, facecolor=colour, **surface)
             wedge.set(zorder=2, visible=half_angle > 0.0)
             self.arcs.append(wedge)
-        self.mark, self.turning = (
-            patches.Polygon(np.zeros((3, 2)), facecolor=dark, edgecolor="none", zorder=3) for _ in range(2)
-        )
+        triangle: dict[str, Any] = {"xy": np.zeros((3, 2)), "facecolor": dark, "edgecolor": "none", "zorder": 3}
+        self.mark, self.turning = patches.Polygon(**triangle), patches.Polygon(**triangle)
         (self.turn,) = ax.plot([], [], color=dark, linewidth=1.2, zorder=3)
         (self.rod,) = ax.plot([], [], color=look.on_page("0.45"), linewidth=4, solid_capstyle="round", zorder=3)
         ball: dict[str, Any] = {"facecolor": look.on_page("0.85"), "edgecolor": dark, "linewidth": 1.2, "zorder": 4}
@@ -199,10 +198,10 @@ class RingArtists(Instant):
             number.set_position(tuple(at + 0.55 * side * rig.ball * forward))
         centre = np.array([states["x"][k], states["y"][k]])
         self.centre.set_data(*centre[:, None])
-        normals, frictions = (
-            np.array([[states[f"{name}_{c}"][k] * self.scale] for c in rig.contacts]) for name in ("normal", "friction")
+        reactions, frictions = (
+            np.array([states[f"{name}_{c}"][k] * self.scale * way for c, way in zip(rig.contacts, ways, strict=True)])
+            for name, ways in (("normal", inwards), ("friction", self.magnification * forwards))
         )
-        reactions, frictions = normals * inwards, frictions * self.magnification * forwards
         weight = np.array([0.0, -self.weight * self.scale])
         for arrows, points, vectors in (
             (self.reactions, contacts, reactions),
@@ -303,9 +302,8 @@ class BeltArtists(Instant):
         for axes in pair:
             axes.set_xlim(left, right)
         edge, dark, green = map(look.on_page, ("0.3", "0.2", _FRICTION))
-        self.body = patches.Rectangle(
-            (0.0, 0.0), 2 * self.half, _BODY, facecolor=look.on_page("0.85"), edgecolor=dark, zorder=4
-        )
+        body: dict[str, Any] = {"facecolor": look.on_page("0.85"), "edgecolor": dark, "zorder": 4}
+        self.body = patches.Rectangle((0.0, 0.0), 2 * self.half, _BODY, **body)
         belt = patches.Rectangle((left, _BELT), right - left, -_BELT, facecolor=look.on_page(look.REST), edgecolor=edge)
         wall = patches.Rectangle((left, 0.0), self.wall - left, 0.7, facecolor=look.on_page("0.8"), edgecolor=edge)
         for patch in (belt, wall, self.body):

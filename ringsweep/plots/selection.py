@@ -54,9 +54,8 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
 
     ds, _ = select(ds.drop_dims("section", errors="ignore"), sel or {})
     if configuration_of(ds).get("sweep", {}).get("follow"):
-        raise InputError(
-            "ds", "follows an axis: a cell starts from the end of the one before, not from its configuration"
-        )
+        starts = "a cell starts from the end of the one before, not from its configuration"
+        raise InputError("ds", f"follows an axis: {starts}")
     if ds.sizes:
         left = ", ".join(f"{dim} ({size})" for dim, size in ds.sizes.items())
         raise InputError("sel", f"one cell is wanted, but {left} is left: hold it too")
@@ -80,10 +79,8 @@ def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, 
         text = value_text(coordinate[index])
         if asked is not None:
             taken, given = _told_apart(coordinate[index], asked)
-            logger.warning(
-                "%s: %s is not in the dataset: the nearest value is taken, %s",
-                *(wanted, plain_text(given), plain_text(taken)),
-            )
+            told = "%s: %s is not in the dataset: the nearest value is taken, %s"
+            logger.warning(told, wanted, plain_text(given), plain_text(taken))
             text = f"{long_name(coordinate)} = {taken} (nearest to {given})"
         texts.append(text)
     return ds, texts
