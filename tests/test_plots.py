@@ -106,6 +106,12 @@ def separated() -> xr.Dataset:
     return ds.assign({name: ((), value) for name, value in scalars.items()}).assign_attrs(outcome=outcome)
 
 
+@pytest.fixture(autouse=True)
+def usual_style():
+    yield
+    plots.style()
+
+
 def panel() -> Axes:
     return Figure(layout="constrained").add_subplot()
 
@@ -390,9 +396,8 @@ def test_axes_are_saved_with_their_figure(tmp_path):
 
 def test_share_of_a_regime_has_no_label_of_a_regime():
     share = (words(make_sweep()["regime"]) == "separating").mean("drive_amplitude").rename("share that separates")
-    ax = panel()
-    share.plot(ax=ax)
-    assert ax.get_ylabel() == "share that separates"
+    (line,) = share.plot(ax=panel())
+    assert line.axes.get_ylabel() == "share that separates"
 
 
 def test_map_axis_may_have_a_single_value():
@@ -562,11 +567,6 @@ PICTURES = {
 class TestPaper:
     """Pictures for a page: nothing collides or is cut off, and all of them have one look."""
 
-    @pytest.fixture(autouse=True)
-    def usual_style(self):
-        yield
-        plots.style()
-
     @pytest.mark.slow
     @pytest.mark.parametrize("width", [85, 170])
     @pytest.mark.parametrize("picture", PICTURES)
@@ -642,11 +642,6 @@ class TestPaper:
 
 
 class TestStyle:
-    @pytest.fixture(autouse=True)
-    def usual_style(self):
-        yield
-        plots.style()
-
     def test_style_can_be_taken_back_and_drawing_changes_no_setting(self):
         before = dict(matplotlib.rcParams)
         for name in ("dark", "print", "transparent"):
@@ -737,8 +732,8 @@ class TestPanels:
 
     def test_map_panel_of_three_dimensions_is_refused_and_the_message_says_what_to_hold(self):
         with pytest.raises(InputError, match="friction_rough_mu_k: hold it, or draw regime_map"):
-            plots.map_panel(make_sweep((3, 3, 2)), ax=Figure().add_subplot())
-        held = plots.map_panel(make_sweep((3, 3, 2)), sel={"friction.rough.mu_k": 0.1}, ax=Figure().add_subplot())
+            plots.map_panel(make_sweep((3, 3, 2)), ax=panel())
+        held = plots.map_panel(make_sweep((3, 3, 2)), sel={"friction.rough.mu_k": 0.1}, ax=panel())
         assert "coefficient of kinetic friction = 0.1" in held.get_title().replace("\n", " ")
 
     def test_history_panel_also_shows_the_related_quantity(self):
@@ -761,8 +756,8 @@ class TestPanels:
         from matplotlib import pyplot
 
         try:
-            assert plots.map_panel(make_sweep()) is pyplot.gca()
-            assert plots.history_panel(make_history()) is pyplot.gca()
+            for draw, ds in ((plots.map_panel, make_sweep()), (plots.history_panel, make_history())):
+                assert draw(ds) is pyplot.gca()
             assert len(pyplot.get_fignums()) == 1
         finally:
             pyplot.close("all")
@@ -824,27 +819,28 @@ def test_ring_history_has_the_four_panels_of_the_paper_over_one_time_axis():
 
 
 def test_history_marks_the_separation_within_its_frame():
+    def said(axes):
+        return axes.get_legend().get_texts()[-1].get_text()
+
     figure = plots.history(separated())
     axes = figure.axes[3]
     (mark,) = (line for line in axes.lines if line.get_marker() == "o")
     assert mark.get_xydata().tolist() == [[10.0, 0.0]]
-    assert axes.get_legend().get_texts()[-1].get_text() == "contact 2 separates, t = 10 s"
-    assert all(other.get_xlim()[1] > 10.1 for other in figure.axes)
+    assert said(axes) == "contact 2 separates, t = 10 s"
     assert axes.get_ylim()[0] < 0.0
-    alone = plots.history_panel(separated(), "normal_1", Figure().add_subplot())
-    assert alone.get_xlim()[1] > 10.1
-    assert "separates" in alone.get_legend().get_texts()[-1].get_text()
+    alone = plots.history_panel(separated(), "normal_1", panel())
+    assert all(other.get_xlim()[1] > 10.1 for other in (*figure.axes, alone))
+    assert "separates" in said(alone)
     # A part of the run that ends earlier does not separate.
-    part = plots.history(separated().sel(time=slice(0, 5))).axes[3]
-    assert not any("separates" in text.get_text() for text in part.get_legend().get_texts())
+    assert "separates" not in said(plots.history(separated().sel(time=slice(0, 5))).axes[3])
 
 
 def test_history_of_many_cycles_is_a_band_with_the_last_cycles_beside_it():
     ds = make_history(40_000, ring=False)
+    assert len(plots.history(make_history(ring=False)).axes) == 3
     t = np.linspace(0.0, 870 * 2 * np.pi, ds.sizes["time"])
-    growing = np.sin(t) * (1.0 + t / t[-1])
-    ds = ds.assign_coords(time=("time", t, ds["time"].attrs)).assign(velocity=("time", growing, ds["velocity"].attrs))
-    figure = plots.history(ds)
+    growing = "time", np.sin(t) * (1.0 + t / t[-1]), ds["velocity"].attrs
+    figure = plots.history(ds.assign_coords(time=("time", t, ds["time"].attrs)).assign(velocity=growing))
     whole = [ax for ax in figure.axes if ax.get_xlim() == (t[0], t[-1])]
     beside = [ax for ax in figure.axes if ax not in whole]
     assert len(whole) == len(beside) == 3
@@ -852,14 +848,12 @@ def test_history_of_many_cycles_is_a_band_with_the_last_cycles_beside_it():
     assert not whole[1].lines
     (band,) = whole[1].collections
     corners = band.get_paths()[0].vertices
-    near = np.abs(corners[:, 0] - t[-1] / 2) < t[-1] / 50
-    assert corners[near, 1].max() == pytest.approx(1.5, abs=0.03)
-    assert corners[near, 1].min() == pytest.approx(-1.5, abs=0.03)
+    near = corners[np.abs(corners[:, 0] - t[-1] / 2) < t[-1] / 50, 1]
+    np.testing.assert_allclose([near.min(), near.max()], [-1.5, 1.5], atol=0.03)
     start, end = beside[1].get_xlim()
     assert 5 * 2 * np.pi <= end - start <= 6.1 * 2 * np.pi
     assert end == t[-1]
     assert any("stick" in text.get_text() for text in beside[0].get_legend().get_texts())
-    assert len(plots.history(make_history(ring=False)).axes) == 3
 
 
 def test_history_shades_stick_for_its_duration():
@@ -876,8 +870,7 @@ def test_strip_shows_the_arc_under_each_contact():
 
 
 def test_history_may_have_one_contact_or_one_sample():
-    single = plots.history(make_history().drop_vars(["normal_2", "zone_2"]))
-    assert len(single.axes[3].lines) == 1
+    assert len(plots.history(make_history().drop_vars(["normal_2", "zone_2"])).axes[3].lines) == 1
     plots.history(make_history(1))
 
 

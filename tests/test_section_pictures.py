@@ -117,14 +117,11 @@ def test_multipliers_stand_in_the_complex_plane_with_the_unit_circle(multipliers
         plots.multiplier_circle(multipliers.drop_vars("multiplier_angle_1"))
 
 
-def test_the_circle_tells_up_from_down_by_its_marks(multipliers):
+def test_the_circle_tells_up_from_down_by_its_marks_and_the_command_draws_it(multipliers, diagram, tmp_path):
     both = xr.concat([multipliers, multipliers], xr.DataArray(["up", "down"], dims="direction", name="direction"))
     ax = plots.multiplier_circle(both, ax=Figure().subplots())
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["up", "down"]
     assert len({one.get_paths()[0].vertices.tobytes() for one in points(ax)}) == 2
-
-
-def test_the_command_draws_multipliers_of_one_axis_in_the_circle(multipliers, diagram, tmp_path):
     multipliers.assign_attrs(diagram.attrs).to_netcdf(tmp_path / "one.nc")
     assert cli.main(["map", str(tmp_path / "one.nc"), "--var", "multiplier_1"]) == 0
     assert (tmp_path / "one-multiplier_1.png").exists()
