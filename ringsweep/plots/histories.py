@@ -180,14 +180,13 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
     ds = datasets.require_history(ds)
     var = datasets.resolve("var", var, [name for name, data in ds.items() if {"time", "impact"} & set(data.dims)])
     ax = look.axes_or_current(ax, 0.34)
+    ax.set_xlabel(axis_label(ds["time"], ds))
     if datasets.compares_laws(ds):
         _draw_laws(ax, ds, (var,))
-        ax.set_xlabel(axis_label(ds["time"], ds))
         look.place_legend(ax, list(ax.get_legend_handles_labels()[0]), handlelength=4)
     else:
         names = next((panel for panel in chain(*datasets.PANELS.values()) if var in panel), (var,))
         draw_panel(ax, ds, names, explain=True)
-    ax.set_xlabel(axis_label(ds["time"], ds))
     return ax
 
 
