@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from solutions import solve
 
+from ringsweep.compile import take
 from ringsweep.models import MODELS
 from ringsweep.models.ring.record import Outcome
+from ringsweep.physics.ring import acceleration, free_determinant
 from ringsweep.quantities.flags import JAMMED, OSCILLATORY, RESTING, SEPARATING
+from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
 
@@ -98,10 +101,31 @@ def test_run_that_approaches_a_jam_is_jammed_and_not_separating(cells):
         "drive.amplitude": 17.604301653296005,
         "time.span": 0.006601531514513469,
     }
-    found = solve(Event(), cells(changes, law="tustin", drive="arctan"))
+    batch = cells(changes, law="tustin", drive="arctan")
+    found = solve(Event(), batch)
     assert found.regime == JAMMED
     assert found.normal_min_1 > 1.0
     assert found.t_end == pytest.approx(0.0037337271, abs=1e-9)
+
+
+def test_before_a_jam_the_velocity_has_a_limit_and_reactions_have_none(cells):
+    """The determinant vanishes there. The run ends before, and the velocity nears it like the root of the time left."""
+    static, kinetic = 1.8, 0.3
+    changes = {"friction.rough.mu_s": static, "friction.rough.mu_k": kinetic, "zone.half_angle": pi}
+    changes |= {"initial.omega": np.linspace(10.0, 40.0, 20), "drive.amplitude": 0.0, "friction.alpha": 5.0}
+    batch = cells(changes, law="tustin", drive="arctan")
+    found = solve(Auto(), batch)
+    jams = (found.regime == JAMMED) & found.certified
+    assert jams.sum() > 5
+    assert np.isinf(found.normal_max_1[jams]).all()
+    assert np.isinf(found.normal_max_2[jams]).all()
+    assert (found.errors[jams, with_errors(Outcome._fields).index("normal_min_1")] < 1e-5).all()
+    body = take(batch, 0).body
+    speed = body.radius * found.omega_end[jams]
+    mu = kinetic + (static - kinetic) * np.exp(-5.0 * abs(speed))
+    with np.errstate(divide="ignore"):
+        determinant = np.array([acceleration(body, -x, -x, (0.0, 1.0, 0.0))[1] for x in mu * np.sign(speed)])
+    assert (abs(determinant) < 1e-12 * free_determinant(body)).all()
 
 
 @pytest.mark.parametrize("law", ["bengisu-akay", "tustin"])

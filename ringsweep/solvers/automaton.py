@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
 from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, modes, recorder, series, simpler, variation
-from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
+from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, RUNNING
 from ringsweep.numerics.clock import Instant, later
 from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
@@ -446,6 +446,10 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             # A run that ends at launch has a history of one row.
             step = Step(mode, is_implicit, now, 0.0, y, y)
             count = _store_row(scene, step, c, 0.0, y, history, count)
+        if status == JAM:
+            s, y, normals = modes.limit_of_jam(scene, mode, now, y)
+            now = later(now, s)
+            record = recorder.at_jam(scene, record, normals, modes.in_space(scene, now, y)[1])
         outcome = recorder.conclude(scene, record, status, now.t, *modes.in_space(scene, now, y))
         for k in range(min(len(outcome), rows.shape[1])):
             rows[i, k] = outcome[k]

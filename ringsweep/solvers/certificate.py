@@ -35,6 +35,8 @@ _MAY_LACK = (
     "swing",
     "jump_max",
     "t_jump_max",
+    "normal_max_1",
+    "normal_max_2",
     *tangent.OUTCOMES,
     *(name for name, variable in OUTCOMES.items() if "section" in variable.dims),
 )
@@ -261,7 +263,8 @@ def _differences(runs: TwoRuns) -> tuple[NDArray[np.float64], NDArray[np.float64
     scale, own_scales = np.empty_like(a), {"s": np.minimum(1.0, runs.batch.span)} | least_scales(runs.batch)
     for unit in set(units.tolist()):
         of_unit = units == unit
-        largest = np.nanmax(np.abs(a[:, of_unit]), axis=1, initial=0.0)
+        # A reaction that is infinite before a jam is no scale of the others.
+        largest = np.nanmax(np.abs(np.where(np.isinf(a), np.nan, a)[:, of_unit]), axis=1, initial=0.0)
         scale[:, of_unit] = (largest + own_scales.get(unit, 0.0 if unit[0] in "mNJ" or unit == "rad s-2" else 1.0))[
             :, None
         ]

@@ -100,6 +100,28 @@ def status_when_stalled(scene, mode, t, y):
 
 
 @hook(optional=True)
+def limit_of_jam(scene, mode, t, y):
+    """The limit of a jam, which a run nears but does not reach.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    t : Instant
+        Time at which the run has ended, s.
+    y : tuple of float
+        State at time `t`.
+
+    Returns
+    -------
+    tuple
+        ``(s, y, normals)``: time from `t` to the limit, s; state there; reactions at contacts 1 and 2, infinite if they
+        grow without bound, else 0. By default the state itself.
+    """
+    return 0.0, y, (0.0, 0.0)
+
+
+@hook(optional=True)
 def sticks(scene, mode):
     """Whether the body counts as stuck in a mode.
 

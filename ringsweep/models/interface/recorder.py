@@ -141,6 +141,27 @@ def keep_memory(scene, row, column, y):
 
 
 @hook(optional=True)
+def at_jam(scene, record, normals, velocity):
+    """Record in the limit of a jam; see :func:`ringsweep.models.interface.modes.limit_of_jam`.
+
+    Parameters
+    ----------
+    scene, record : NamedTuple
+        One cell, and its record.
+    normals : tuple of float
+        Reactions there, N.
+    velocity : float
+        Velocity of the body in space there, rad/s or m/s.
+
+    Returns
+    -------
+    NamedTuple
+        By default `record`.
+    """
+    return record
+
+
+@hook(optional=True)
 def after_event(scene, record, before, mode, t):
     """Record after an event, at which a mode begins. Methods of constant step do not call it.
 

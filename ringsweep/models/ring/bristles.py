@@ -125,7 +125,7 @@ def _initial_mode(scene, t, y):
     place_1, place_2 = places_at(scene, rho)
     sign = 1 if v > 0.0 else -1
     if v == 0.0:
-        now = _sliding_at(scene, Mode(sign, BAND, place_1, place_2), t, y)
+        now = sliding_at(scene, Mode(sign, BAND, place_1, place_2), t, y)
         epsilon, _ = ring.acceleration(scene.body, *now.K, now.motion)
         sign = 1 if epsilon > drives.turn(scene.drive, t)[2] else -1
     place_1, place_2 = places_beyond(scene, place_1, place_2, rho, sign)
@@ -136,7 +136,7 @@ def _initial_mode(scene, t, y):
 
 
 @inlined
-def _sliding_at(scene, mode, t, y):
+def sliding_at(scene, mode, t, y):
     """The :class:`Slip` of a state of a mode."""
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     phi, omega = y[0] + theta, ring.angular_velocity(scene.body, y[1], ring_omega)
@@ -147,7 +147,7 @@ def _sliding_at(scene, mode, t, y):
 @inlined
 def _after_jump(scene, mode, t, y):
     """Status after friction may have jumped."""
-    now = _sliding_at(scene, mode, t, y)
+    now = sliding_at(scene, mode, t, y)
     if isnan(now.K[0] + now.K[1] + now.motion[0] + now.motion[2]):
         return BROKEN
     return ENDS[contact.sliding(scene.body, *now.K, now.motion)]
@@ -155,7 +155,7 @@ def _after_jump(scene, mode, t, y):
 
 @modes.status_when_stalled.implements(BristleRing)
 def _status_when_stalled(scene, mode, t, y):
-    now = _sliding_at(scene, mode, t, y)
+    now = sliding_at(scene, mode, t, y)
     _, determinant = ring.acceleration(scene.body, *now.K, now.motion)
     return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(scene.body) else JAM
 
@@ -167,7 +167,7 @@ def _switch(scene, mode, guard, t, y):
     if guard == DETERMINANT:
         return JAM, mode, y
     if guard in (NORMAL_1, NORMAL_2):
-        now = _sliding_at(scene, mode, t, y)
+        now = sliding_at(scene, mode, t, y)
         loads = loads_in_slip(scene.body, now.K, now.motion)
         return lost_in_slip(scene.body, loads, guard == NORMAL_1), mode, y
     if guard == SLOW:

@@ -179,6 +179,9 @@ def conclude(record, status, t, phi, omega):
     )
 
 
+#: Record with other extremes of the velocity, and other greatest reactions.
+with_peaks = replacing("omega_min", "omega_max", "normal_max_1", "normal_max_2")
+
 #: Record with another long run.
 with_long_run, _with_shocks = replacing("long_run"), replacing("shocks")
 

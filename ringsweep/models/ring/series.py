@@ -84,7 +84,7 @@ _AT_ONCE = 1e-9
 
 # The body is about to jam if the determinant of the balances is smaller than the first share of its value without
 # friction. If friction varies with the speed, the body jams at the second share.
-NEARLY_JAMMED, LEAST_DETERMINANT = 1e-4, 1e-6
+NEARLY_JAMMED, LEAST_DETERMINANT = 1e-2, 1e-6
 
 # Where both roots of the equation of stick meet, a reaction may fall to zero at an infinite rate. If it is smaller
 # than this share of the load there, the contact opens.
@@ -261,14 +261,14 @@ def _mode_at_rest(scene, t, phi, place_1, place_2, stick_end):
 def _after_jump(scene, mode, t, y):
     """Status in slip after friction may have jumped."""
     phi, v = y
-    K1, K2, omega = _friction_at(scene, mode, t, v)
+    K1, K2, omega = friction_at_speed(scene, mode, t, v)
     if isnan(phi + omega + K1 + K2):
         return BROKEN
     return ENDS[contact.sliding(scene.body, K1, K2, (sin(phi), cos(phi), omega))]
 
 
 @inlined
-def _friction_at(scene, mode, t, v):
+def friction_at_speed(scene, mode, t, v):
     """K at each contact, and angular velocity of the body, at the sliding velocity `v`."""
     K1, K2 = friction_under(scene, mode, abs(v))
     return K1, K2, ring.angular_velocity(scene.body, v, drives.turn(scene.drive, t)[1])
@@ -286,7 +286,7 @@ def loads_in_slip(body, K, motion):
 @inlined
 def _loads_at(scene, mode, t, y):
     """What :func:`loads_in_slip` returns for a state."""
-    K1, K2, omega = _friction_at(scene, mode, t, y[1])
+    K1, K2, omega = friction_at_speed(scene, mode, t, y[1])
     return loads_in_slip(scene.body, (K1, K2), (sin(y[0]), cos(y[0]), omega))
 
 
