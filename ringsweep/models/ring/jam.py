@@ -46,7 +46,7 @@ def _balance(scene, mode, t, y, v):
 def _of_closed(body, K, motion, ring_epsilon):
     epsilon, determinant = ring.acceleration(body, *K, motion)
     normal_1, normal_2 = ring.reactions(body, *K, motion)
-    load = body.mass * (body.gravity + body.radius * motion[2] * motion[2])
+    load = body.mass * (body.gravity + body.radius * motion[2] * motion[2]) + 1e-300
     share = determinant / ring.free_determinant(body)
     return share, body.radius * (epsilon - ring_epsilon), 0.0, normal_1 / load, normal_2 / load
 
