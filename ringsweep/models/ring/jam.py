@@ -17,7 +17,7 @@ from ringsweep.models.ring.impact.mode import BOTH, FIRST, NONE, angle_when_clos
 from ringsweep.models.ring.impact.pivot import friction
 from ringsweep.models.ring.impact.record import with_base
 from ringsweep.models.ring.record import with_peaks
-from ringsweep.models.ring.series import NEARLY_JAMMED, friction_at_speed
+from ringsweep.models.ring.series import LEAST_DETERMINANT, NEARLY_JAMMED, friction_at_speed
 from ringsweep.physics import drives, pivot, ring
 from ringsweep.physics.impact import ImpactRing
 from ringsweep.physics.ring import BristleRing, Ring
@@ -82,7 +82,8 @@ def _limit(scene, mode, t, y):
     """Time to the limit of a jam, s; changes of the sliding velocity and of the gap's angular velocity; reactions."""
     share, acceleration, tilt, load_1, load_2 = _balance(scene, mode, t, y, y[1])
     nothing = 0.0, 0.0, 0.0, (0.0, 0.0)
-    if not abs(share) <= NEARLY_JAMMED or acceleration == 0.0:
+    # Where friction has jumped, a run may end with any determinant below zero.
+    if not -LEAST_DETERMINANT <= share <= NEARLY_JAMMED or acceleration == 0.0:
         return nothing
     before, share_before = y[1], share
     v = before + _FIRST_STEP * (abs(before) if acceleration > 0.0 else -abs(before))
