@@ -134,7 +134,7 @@ def test_all_ways_to_a_picture_choose_the_diagram(diagram):
         ["x (m)", "exponent (s$^{-1}$)", "multipliers"]
     ] * 3
     # What only a map has makes it a map, and so does its variable.
-    for options in ({"y": "direction"}, {"var": "regime"}):
+    for options in ({"y": "direction"}, {"var": "regime"}, {"title": "mine"}):
         assert "x (m)" not in [ax.get_ylabel() for ax in plots.regime_map(diagram, **options).axes]
     several = xr.concat([diagram, diagram], xr.DataArray([1.0, 2.0], dims="belt_velocity", name="belt_velocity"))
     with pytest.raises(InputError, match="a diagram has one axis"):

@@ -72,7 +72,8 @@ def regime_map(
         Coordinates of the horizontal and the vertical axis; by default the first and the second that were swept.
     var : str, optional
         Variable to draw; by default the regime. If the sweep has sections along one axis, they are drawn as a
-        :func:`bifurcation` diagram instead, and one sampled cell as a :func:`probability_panel`.
+        :func:`bifurcation` diagram instead, and one sampled cell as a :func:`probability_panel`, unless a further
+        argument asks for what only a map has.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
         text may have a unit. A warning and the title state the value taken if it is another.
@@ -115,7 +116,8 @@ def regime_map(
     >>> regime_map(ds, var="phi_max").axes[0].get_ylabel()
     'angle (°)'
     """
-    kind, var = suitable(ds, var, sel or {}, boundaries is None and not (y or norm or cmap or units))
+    plain = boundaries is None and title is True and legend is True and not (y or norm or cmap or units)
+    kind, var = suitable(ds, var, sel or {}, plain)
     if kind == "diagram":
         return bifurcation(ds, x, var, sel)
     width = look.figure_width()
