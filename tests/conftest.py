@@ -115,7 +115,7 @@ def each_test_is_warned() -> None:
 def scene() -> dict[str, Any]:
     """Scene of the paper's Fig. 29 with stiction in place of Bengisu-Akay friction, for 4 s."""
     given = dict(load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"])
-    friction = {"law": "stiction", "rough": given["friction"]["rough"], "rest": given["friction"]["rest"]}
+    friction = {"law": "stiction", "rough": given["friction"]["rough"], "rest": given["friction"]["elsewhere"]}
     return given | {"friction": friction, "time": {"span": "4 s"}}
 
 

@@ -29,6 +29,7 @@ from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.quantity import cf_units
 from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import Variable
+from ringsweep.runs.fit import _ranges
 from ringsweep.solvers.rk4 import RK4
 from ringsweep.storage import netcdf
 
@@ -455,6 +456,39 @@ def test_axis_of_a_file_with_angles_of_many_turns_gives_a_warning(told, write):
     rocking = TEXT.replace("law: arctan", "law: sinusoidal\n    frequency: 1")
     (found,) = told(load, write(rocking.replace("geomspace: [0.1, 10, 5]", "linspace: [10, 60, 5]")))
     assert "scene.drive.amplitude is 60 rad" in found
+
+
+@pytest.mark.parametrize("in_scene", ["elsewhere", "rest"])
+@pytest.mark.parametrize("typed", ["elsewhere", "rest"])
+class TestFrictionElsewhereHasTwoNames:
+    def test_an_axis_keeps_the_name_that_was_typed(self, in_scene, typed, write):
+        text = TEXT.replace("    rest:", f"    {in_scene}:").replace("drive.amplitude:", f"friction.{typed}.mu_k:")
+        config = load(write(text.replace("[0.1, 10, 5]", "[0.1, 0.2, 5]")))
+        assert list(config.axes.sizes) == [f"friction_{typed}_mu_k", "zone_half_angle"]
+        assert load(config.source).axes.sizes == config.axes.sizes
+        axes = {f"friction.{typed}.mu_k": [0.05, 0.1]}
+        assert read_axes(read_scene(yaml.safe_load(text)["scene"], axes), axes).sizes == {f"friction_{typed}_mu_k": 2}
+
+    def test_a_setting_changes_the_one_value(self, in_scene, typed, write):
+        text = TEXT.replace("    rest:", f"    {in_scene}:")
+        config = with_values(write(text), [f"friction.{typed}.mu_k=0.05"])
+        assert config.scene.values[f"friction.{in_scene}.mu_k"] == 0.05
+        assert f"friction.{in_scene}.mu_s" in refusal(with_values, write(text), [f"friction.{typed}.mu_s=a"]).path
+
+    def test_a_fit_and_a_threshold_find_the_value(self, in_scene, typed, write):
+        config, path = write(TEXT.replace("    rest:", f"    {in_scene}:")), f"friction.{typed}.mu_k"
+        assert _ranges(load(config), f"{path}=0.1..0.2") == {f"friction.{in_scene}.mu_k": (0.1, 0.2)}
+        problem = refusal(ringsweep.threshold, config, path, "separating", (0.2, 0.1)).problem
+        assert problem == "0.1 is not greater than 0.2, where the interval begins"
+
+
+def test_both_names_of_friction_elsewhere_at_once_are_one_error(write):
+    both = TEXT.replace("    rest:", "    elsewhere: {mu_s: 0.2, mu_k: 0.1}\n    rest:")
+    error = refusal(load, write(both))
+    assert (error.path, error.line) == ("scene.friction.rest", 9)
+    assert error.problem == "is another name of friction.elsewhere: keep one of them"
+    axes = {"friction.rest.mu_k": [0.1], "friction.elsewhere.mu_s": [0.2], 1: [0.3]}
+    assert refusal(read_scene, SCENE, axes).problem == error.problem
 
 
 def test_each_unused_parameter_of_another_law_gives_one_warning(told):

@@ -43,7 +43,7 @@ def short():
 def config():
     """The paper's Fig. 29 with the limit law, over amplitudes and widths."""
     scene = dict(load(CONFIGS / "regime_map.yaml").source["scene"])
-    friction = {"law": "stiction", "rough": scene["friction"]["rough"], "rest": scene["friction"]["rest"]}
+    friction = {"law": "stiction", "rough": scene["friction"]["rough"], "rest": scene["friction"]["elsewhere"]}
     grid = {
         "drive.amplitude": {"geomspace": [0.5, 8.0, 5]},
         "zone.half_angle": {"linspace": ["5 deg", "40 deg", 4]},

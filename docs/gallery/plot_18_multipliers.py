@@ -18,7 +18,7 @@ scene = {
     "model": "ring-single-contact",
     "body": {"mass": 0.2},
     "ring": {"radius": 0.1},
-    "friction": {"law": "stiction", "rest": {"mu_s": 0.12, "mu_k": 0.08}},
+    "friction": {"law": "stiction", "elsewhere": {"mu_s": 0.12, "mu_k": 0.08}},
     "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": 1.0},
     "initial": {"phi": 0.4, "omega": 0.0},
     "time": {"span": 120.0},

@@ -13,6 +13,7 @@ from ringsweep.config.configuration import tell_unit as tell_unit
 from ringsweep.config.configuration import with_refine as with_refine
 from ringsweep.config.configuration import with_values as with_values
 from ringsweep.config.own_files import load_own_files
+from ringsweep.config.scene import as_named as as_named
 from ringsweep.config.scene import sweepable as sweepable
 from ringsweep.config.solver import read_solver as read_solver
 

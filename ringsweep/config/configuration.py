@@ -28,13 +28,13 @@ from ringsweep.config.axes import (
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.follow import Follow, put_state, read_follow, run_to_continue, with_direction
 from ringsweep.config.refine import Refinement, read_refinement
-from ringsweep.config.scene import parse_scene, sweepable, warn_of_plain_angle
+from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import read_values, suggestion, warn_once
 from ringsweep.config.solver import read_solver
 from ringsweep.config.uncertain import Sample, read_sample
 from ringsweep.config.yaml_text import Document, scalar
 from ringsweep.errors import InputError
-from ringsweep.models.scene import LAW, Scene
+from ringsweep.models.scene import ELSEWHERE, LAW, Scene
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, other_unit, show
 from ringsweep.quantities.variables import written
@@ -346,6 +346,9 @@ def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
     """Put a value into the tree; its full path and what stood there. The path is checked later, with the tree."""
     told = f"--set {path}={value}", None
     full = path if path.split(".")[0] in ("scene", "solver", "record") else f"scene.{path}"
+    for name in ELSEWHERE:
+        if name in (written(doc.tree, "friction") or ()):
+            full = as_named(full, name)
     *parents, last = full.split(".")
     node: Any = doc.tree
     for depth, key in enumerate(parents, start=1):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -28,7 +29,7 @@ from ringsweep.config.tables import TABLES, read_samples
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
-from ringsweep.models.scene import LAW, Scene, Structure
+from ringsweep.models.scene import ELSEWHERE, LAW, Scene, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.formula import NAMES
@@ -74,9 +75,10 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     scene = section_of(doc.tree, "scene", "")
     model = choose(MODELS, scene, "scene.model", "model")
     exponent, section = read_record(doc.tree.get("record", {}), model)
+    elsewhere = _name_elsewhere(scene, swept)
     zones = _zones(scene)
     names, own, curve = _read_friction(doc, scene, model, laws)
-    moved = _read_motion(scene, model, swept)
+    moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
     keys = _Keys(model, dict.fromkeys([*law_choice(model, own).names]), own, zones or ("zones.0",), moved)
     leaves = dict(keys.leaves(scene, names))
@@ -101,6 +103,24 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         if path in leaves:
             warn_of_plain_angle(path, leaves[path], parameter)
     return Scene(structures, values, scene)
+
+
+def _name_elsewhere(scene: dict[str, Any], swept: Collection[str]) -> str:
+    """Key of the friction outside the zones: that of the axes. The scene's own is renamed if it is the other one."""
+    friction = section_of(scene, "friction", "scene.") if "friction" in scene else {}
+    given = [name for name in ELSEWHERE if name in friction]
+    typed = [name for name in ELSEWHERE if any(str(path).startswith(f"friction.{name}.") for path in swept)]
+    if len(given) > 1 or len(typed) > 1:
+        raise InputError("scene.friction.rest", "is another name of friction.elsewhere: keep one of them")
+    name = (typed or given or ELSEWHERE)[0]
+    if given and given != [name]:
+        friction[name] = friction.pop(given[0])
+    return name
+
+
+def as_named(path: str, name: str) -> str:
+    """The path with this name of ``friction.elsewhere`` in the place of its other one."""
+    return re.sub(rf"^((scene\.)?friction)\.({'|'.join(ELSEWHERE)})(?=\.|$)", rf"\1.{name}", path)
 
 
 def _zones(scene: dict[str, Any]) -> tuple[str, ...]:
@@ -155,7 +175,7 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
     if "drive" in scene:
         names = dict.fromkeys([*DRIVES, FORMULA])
         drive = choose(names, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
-    impact = model in WITH_IMPACT and ("impact" in scene or any(path.startswith("impact.") for path in swept))
+    impact = model in WITH_IMPACT and ("impact" in scene or any(str(path).startswith("impact.") for path in swept))
     found = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})), impact=impact)
     return replace(found, own_force=own_force(scene.get("force"))) if _takes_force(model) else found
 
@@ -289,6 +309,7 @@ class _Keys:
             *product(known[:1], DRIVES, ((),)),
         ):
             one = Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT)
+            one = replace(one, elsewhere=moved.elsewhere if moved is not None else ELSEWHERE[0])
             paths |= dict.fromkeys(_paths_under(one, model_of(one), one.law_type, one.drive_type))
         if moved is not None:
             paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))

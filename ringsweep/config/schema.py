@@ -14,6 +14,7 @@ from ringsweep.config.follow import DIRECTIONS
 from ringsweep.config.own import FORMULA, TABLE_LAW
 from ringsweep.config.record import INSTANTS, KEEP, PERIOD
 from ringsweep.config.refine import NUMBERS
+from ringsweep.config.scene import as_named
 from ringsweep.config.tables import INTERPOLATIONS, TABLES
 from ringsweep.config.uncertain import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.models import MODELS, WITH_IMPACT, parameters
@@ -45,6 +46,8 @@ def schema() -> dict[str, Any]:
                 meanings = known.setdefault(path, [])
                 if parameter not in meanings:
                     meanings.append(parameter)
+    for path in [path for path in known if path.startswith("friction.rest.")]:
+        known[as_named(path, "elsewhere")] = known[path]
     leaves = {path: _any_of([_number(parameter) for parameter in meanings]) for path, meanings in known.items()}
     joins = INTERPOLATIONS.items()
     law_by_formula = _section({"mu": _formula(), "at_rest": _at_rest()}, "mu")

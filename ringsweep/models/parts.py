@@ -55,7 +55,7 @@ def larger_eigenvalue(most, trace, determinant):
 def friction_coefficients(
     structure: Structure, place: str, values: Values
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Static and kinetic coefficients at a path such as ``friction.rest``, each of shape ``(cells,)``.
+    """Static and kinetic coefficients at a path such as ``friction.elsewhere``, each of shape ``(cells,)``.
 
     A law with one coefficient has it in the place of both. For a law from a table the second one is the factor on the
     table.

@@ -21,6 +21,9 @@ Values = Mapping[str, NDArray[np.float64]]
 #: Path of the friction law: the only path without a number that a sweep can vary.
 LAW = "friction.law"
 
+#: Keys of ``friction`` under which the coefficients outside the zones may stand; both have one meaning.
+ELSEWHERE = "elsewhere", "rest"
+
 
 class Section(NamedTuple):
     """Points of a motion that a run keeps.
@@ -69,6 +72,8 @@ class Structure:
         Whether the record of a run holds its exponent and multipliers.
     section : Section, optional
         Points that a run keeps.
+    elsewhere : str
+        Which of :data:`ELSEWHERE` the configuration has.
     """
 
     model: str
@@ -84,6 +89,7 @@ class Structure:
     impact: bool = False
     exponent: bool = False
     section: Section | None = None
+    elsewhere: str = "rest"
 
     @property
     def law_type(self) -> type:

@@ -142,10 +142,10 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     >>> index = xr.DataArray([[0.8, 0.2]], dims=("word", "parameter"))
     >>> ds = xr.Dataset(
     ...     {f"sobol_{which}{end}": index for which in ("first", "total") for end in ("", "_low", "_high")},
-    ...     coords={"word": ["separating"], "parameter": ["friction.rest.mu_k", "zone.half_angle"]},
+    ...     coords={"word": ["separating"], "parameter": ["friction.elsewhere.mu_k", "zone.half_angle"]},
     ... ).assign(probability=("word", [0.4]))
     >>> [label.get_text() for label in sensitivity_panel(ds).get_yticklabels()]
-    ['friction.rest.mu_k', 'zone.half_angle']
+    ['friction.elsewhere.mu_k', 'zone.half_angle']
     """
     ds = require_sample(ds, "sobol_first")
     if word is None:

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors
-from ringsweep.config import Config, load, sweepable, with_values
+from ringsweep.config import Config, as_named, load, sweepable, with_values
 from ringsweep.config.axes import dimension
 from ringsweep.config.sections import one_of, read_values
 from ringsweep.config.yaml_text import Document, name_and_unit
@@ -224,7 +224,8 @@ def _ranges(config: Config, vary: Any) -> dict[str, tuple[float, float]]:
         raise InputError("vary", f"paths are expected, such as friction.rough.mu_k, got {show(vary)}")
     found: dict[str, tuple[float, float]] = {}
     known: Mapping[str, Any] = sweepable(config.scene)
-    for path, ends in vary.items():
+    for given, ends in vary.items():
+        path = as_named(given, config.scene.structure.elsewhere)
         if path == "time.span":
             raise InputError("vary", "time.span has no influence on a measured history: it ends with the last time")
         if ends is None and path not in config.axes.columns and (own := config.scene.values.get(path)):

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Config, as_written, load, sweepable, tell_unit, with_values, yaml_text
+from ringsweep.config import Config, as_named, as_written, load, sweepable, tell_unit, with_values, yaml_text
 from ringsweep.config.axes import Axes, dimension, sweep_section, swept_parameter, swept_paths
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
@@ -131,6 +131,7 @@ def locate(
     """
     settings = list(settings)
     whole = load(config, _beside_axes(config, path, settings))
+    path = as_named(path, whole.scene.structure.elsewhere)
     sampled = () if whole.sample is None else (one for factor in whole.sample.factors for one in factor.paths)
     check_word(regime, whole.scene, {path, *whole.axes.columns, *sampled})
     if whole.sample is not None:

@@ -141,7 +141,7 @@ class SingleContactRing(Model, Continues):
         """Parameters of a scene of this structure, by path."""
         law = structure.law_type
         found = dict(self.body)
-        places = {"friction.rest": "the rest of the ring"}
+        places = {f"friction.{structure.elsewhere}": "the rest of the ring"}
         if structure.arcs == ("zone",):
             places["friction.rough"] = "the zone"
         else:
@@ -176,7 +176,7 @@ class SingleContactRing(Model, Continues):
             )
             for arc in structure.arcs
         ]
-        rest = friction_coefficients(structure, "friction.rest", values)
+        rest = friction_coefficients(structure, f"friction.{structure.elsewhere}", values)
         surface = zones.surface_of(arcs, *rest)
         surfaces = [rest, *((arc.mu_s, arc.mu_k) for arc in arcs)]
         try:

@@ -22,7 +22,8 @@ HIDDEN = ("slope_at_rest", "slope_beyond", "edges", "thresholds", "pieces", "ban
 
 #: Names that no parameter can have: those of the formula, keys of the section ``friction``, and what a law has besides.
 RESERVED = frozenset(
-    {"v", "pi", "mu", "law", "laws", "at_rest", "rough", "rest", "file", "viscous", "count", "index", *HIDDEN}
+    {"v", "pi", "mu", "law", "laws", "at_rest", "rough", "elsewhere", "rest", "file", "viscous", "count", "index"}
+    | {*HIDDEN}
 )
 
 #: Coefficients of the surface.
