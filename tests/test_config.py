@@ -458,6 +458,33 @@ def test_axis_of_a_file_with_angles_of_many_turns_gives_a_warning(told, write):
     assert "scene.drive.amplitude is 60 rad" in found
 
 
+@pytest.mark.parametrize(
+    ("changes", "path", "hint"),
+    [
+        (
+            {"drive": {"law": "constant", "speed": "60 rpm"}},
+            "drive.speed",
+            "; did you mean `amplitude`? (known: law, amplitude)",
+        ),
+        ({"drive": {"law": "sinusoidal", "rate": 1}}, "drive.rate", " (known: law, amplitude, frequency, phase)"),
+        ({"drive": {"law": "formula", "theta": "A*t", "A": 1, "fil": 2}}, "drive.fil", " (known: theta, law, A)"),
+        (
+            {"friction": {"law": "coulomb", "rough": {"mu": 1}}},
+            "friction.rough.mu",
+            "; did you mean `mu_k`? (known: mu_k)",
+        ),
+    ],
+)
+def test_an_unknown_key_lists_the_keys_of_the_law_that_is_given_only(changes, path, hint):
+    error = refusal(read_scene, SCENE | changes)
+    assert (error.path, error.problem) == (f"scene.{path}", f"unknown key{hint}")
+
+
+def test_a_number_under_mu_is_no_formula_where_another_law_is_named():
+    error = refusal(read_scene, SCENE | {"friction": {"law": "stiction", "mu": 0.3}})
+    assert (error.path, error.problem[:8]) == ("scene.friction.elsewhere.mu_s", "missing:")
+
+
 @pytest.mark.parametrize("in_scene", ["elsewhere", "rest"])
 @pytest.mark.parametrize("typed", ["elsewhere", "rest"])
 class TestFrictionElsewhereHasTwoNames:

@@ -103,7 +103,9 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
         if not _may_name(name):
             raise InputError(path, f"{show(name)} cannot be the name of a law: choose another name")
         found[name] = _law(Definition(section["mu"], section.get("at_rest")), path)
-    if "mu" in friction and friction.get("law") != TABLE_LAW:
+    # Beside another law a text may be the formula for a sweep over laws; a number is a misnamed coefficient.
+    of_formula = friction.get("law", FORMULA) == FORMULA or isinstance(friction.get("mu"), str)
+    if "mu" in friction and friction.get("law") != TABLE_LAW and of_formula:
         found[FORMULA] = _law(Definition(friction["mu"], friction.get("at_rest")), "scene.friction")
     return found
 

@@ -282,7 +282,7 @@ def _paths_under(structure: Structure, *registered: Any) -> tuple[str, ...]:
 
 
 class _Keys:
-    """Keys that a scene of a model can have, under some laws and all drives.
+    """Keys that a scene of a model can have, under some laws and some drives.
 
     Attributes
     ----------
@@ -299,14 +299,15 @@ class _Keys:
         own: Mapping[str, type] = MappingProxyType({}),
         zones: tuple[str, ...] = ("zones.0",),
         moved: Structure | None = None,
+        drives: Collection[str] = (*DRIVES, FORMULA),
     ):
         self.model, self.moved, self.own, self.zones = model, moved, own, zones
-        paths = dict.fromkeys(_structural(model, "table", laws))
+        paths = dict.fromkeys(path for drive in drives for path in _structural(model, drive, laws))
         known = [law for law in laws if law in MODELS[model].laws or law in own]
         # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take long.
         for law, drive, arcs in (
             *product(known, ("none",), ((), ("zone",), zones)),
-            *product(known[:1], DRIVES, ((),)),
+            *product(known[:1], (drive for drive in drives if drive in DRIVES), ((),)),
         ):
             one = Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT)
             one = replace(one, elsewhere=moved.elsewhere if moved is not None else ELSEWHERE[0])
@@ -356,8 +357,13 @@ class _Keys:
                 if other != self.model and (places or key in keys.children.get(section, ())):
                     places = places or f"`{section}.{key}`".replace("`.", "`")
                     return f": model {other} has {places}, this is model {self.model}"
-        near = _Keys(self.model, laws, self.own, self.zones[:1], self.moved) if laws else self
-        return suggestion(key, near.children.get(section, self.children[section]))
+        near = self
+        if laws and self.moved is not None:
+            near = _Keys(self.model, laws, self.own, self.zones[:1], self.moved, (self.moved.drive,))
+        known = near.children.get(section, self.children[section])
+        numbers = [name for name in known if name != "law"]
+        # The only number of a section is the one that is meant, whatever it is called.
+        return suggestion(numbers[0] if len(numbers) == 1 else key, known)
 
     def ending_with(self, key: str) -> str:
         """Paths whose last key is `key`, as text; those of a list of zones are left out."""
