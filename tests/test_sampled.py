@@ -46,6 +46,34 @@ def config(scene: Any = BELT, grid: Any = None, solver: str = "auto", **sample: 
     return {"scene": scene, "sweep": sweep, "solver": solver}
 
 
+@pytest.mark.parametrize(
+    ("path", "text", "ends"),
+    [
+        ("friction.mu_s", "0.15 ± 10 %", (0.135, 0.165)),
+        ("friction.mu_s", "0.15 +- 0.01", (0.14, 0.16)),
+        ("friction.mu_s", "15 %+/-10%", (0.135, 0.165)),
+        ("body.mass", "980 ± 20 g", (0.96, 1.0)),
+        ("initial.velocity", "-0.1 ± 50 %", (-0.15, -0.05)),
+    ],
+)
+def test_a_tolerance_is_the_uniform_distribution_between_its_bounds(path, text, ends):
+    (factor,) = load(config(of={path: {"uniform": text}})).sample.factors
+    assert (factor.kind, factor.numbers) == ("uniform", pytest.approx(ends))
+    drawn = factor.draw(np.linspace(0.0, 1.0, 5))[path]
+    assert (drawn.min(), drawn.max()) == pytest.approx(ends)
+
+
+@pytest.mark.parametrize("model", ["ring", "ring-single-contact", "belt"])
+def test_a_first_configuration_has_a_tolerance_to_uncomment(model, tmp_path):
+    target = tmp_path / "my.yaml"
+    main(["init", str(target), "--model", model])
+    text = target.read_text(encoding="utf-8")
+    target.write_text(re.sub(r"^  # (sample:|  )", r"  \1", text, flags=re.MULTILINE), encoding="utf-8")
+    (factor,) = load(target).sample.factors
+    low, high = factor.numbers
+    assert (factor.kind, high / low) == ("uniform", pytest.approx(1.1 / 0.9))
+
+
 def run(given: dict[str, Any], *args: Any, **options: Any) -> xr.Dataset:
     return ringsweep.run(given, *args, **({"jobs": 1, "progress": False} | options)).load()
 

@@ -231,6 +231,8 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
     for name, arguments in DISTRIBUTIONS.items():
         count, about = len(arguments), f"[{', '.join(arguments)}]"
         kinds[name] = {"description": about, "type": "array", "items": _VALUE, "minItems": count, "maxItems": count}
+    about = "[least value, greatest value], or mean ± tolerance, which may be in per cent"
+    kinds["uniform"] = {"description": about, "anyOf": [kinds["uniform"], _TEXT]}
     columns = {"type": "object", "additionalProperties": _list(_VALUE)}
     kinds["values"] = _either("values, each as probable as the others", _list(_VALUE), columns)
     kinds["file"] = _text("CSV file with a column for each path; a row is a draw")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -21,7 +22,7 @@ from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.trailer import MAX_CELLS
-from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.units import NUMBER, is_plain, quantity, show
 from ringsweep.statistics import DISTRIBUTIONS, METHODS, distribution, saltelli, unit_points
 
 #: Keys of ``sweep.sample`` with a number.
@@ -33,6 +34,9 @@ NUMBERS = {
 
 #: Keys of ``sweep.sample``.
 KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity", "keep")
+
+# Mean and tolerance of a uniform distribution, as engineers write them.
+_TOLERANCE = re.compile(r"\s*(.+?)\s*(?:±|\+/?-)\s*(.+?)\s*")
 
 # The least and the greatest share that a point of a sample can have, roughly.
 _FAR = np.array([1e-16, 1.0 - 1e-16])
@@ -276,7 +280,8 @@ def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
 def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping[str, Parameter | Choice]) -> Factor:
     kinds = (*DISTRIBUTIONS, "values", "file")
     if not isinstance(spec, dict):
-        example = f"such as `{{normal: [0.3, 10 %]}}`, got {show(spec)} ({', '.join(kinds)})"
+        example = "such as `{uniform: 0.3 ± 10 %}`, or `{normal: [0.3, 10 %]}` if 10 % is a standard deviation"
+        example += f", got {show(spec)} ({', '.join(kinds)})"
         raise InputError(where, f"a distribution is expected, {example}")
     for key in spec:
         if key not in (*kinds, "over"):
@@ -325,31 +330,49 @@ def _table(given: Any, parameters: Mapping[str, Any], where: str) -> tuple[tuple
 
 
 def _numbers(given: Any, kind: str, parameter: Parameter, where: str) -> tuple[float, ...]:
-    """The numbers of a distribution. A standard deviation in per cent is a share of the mean."""
+    """The numbers of a distribution. A standard deviation or a tolerance in per cent is a share of the mean."""
     arguments = DISTRIBUTIONS[kind]
     wanted = ", ".join(arguments)
+    written = given
+    if tolerated := kind == "uniform" and isinstance(given, str):
+        arguments, given = ("mean", "tolerance"), _mean_and_tolerance(given, where)
     if not isinstance(given, list) or len(given) != len(arguments):
         raise InputError(where, f"[{wanted}] is expected, got {show(given)}")
     found: list[float] = []
     for k, (what, value) in enumerate(zip(arguments, given, strict=True)):
-        at, scatter = f"{where}.{k}", what == "standard deviation"
+        at, scatter = where if tolerated else f"{where}.{k}", what in ("standard deviation", "tolerance")
         share = scatter and isinstance(value, str) and value.strip().endswith("%")
         least = 0.0 if scatter else -math.inf
         number = Parameter("1" if share else parameter.unit, f"{what} of {parameter.long_name}", least, open_lower=True)
         if share and found[0] == 0.0:
-            raise InputError(at, f"{show(value)} of a mean of 0 is nothing: give the standard deviation itself")
+            raise InputError(at, f"{show(value)} of a mean of 0 is nothing: give the {what} itself")
         found.append(quantity(value, number, at) * (abs(found[0]) if share else 1.0))
+    if tolerated:
+        found = [found[0] - found[1], found[0] + found[1]]
     ends = found if kind in ("uniform", "triangular") else found[2:]
     if ends and not (ends[0] < ends[-1] and ends == sorted(ends)):
         problem = "the first end must be less than the last, a mode between them"
-        raise InputError(where, f"{problem}, got {show(given)} ({wanted})")
+        raise InputError(where, f"{problem}, got {show(written)} ({wanted})")
     if kind == "lognormal" and found[0] <= 0.0:
         raise InputError(where, f"the mean must be greater than 0, got {show(given)} ({wanted})")
     with np.errstate(all="ignore"):
         far = distribution(kind, *found).ppf(_FAR)
     if not np.isfinite(far).all():
-        raise InputError(where, f"{show(given)} reaches beyond the range of numbers")
+        raise InputError(where, f"{show(written)} reaches beyond the range of numbers")
     return tuple(found)
+
+
+def _mean_and_tolerance(given: str, where: str) -> list[str]:
+    """Both parts of a text such as ``"0.1 ± 10 %"``. In ``"15 ± 1 deg"`` both have the unit."""
+    match = _TOLERANCE.fullmatch(given)
+    if match is None:
+        raise InputError(where, f"[least value, greatest value] or 0.1 ± 10 % is expected, got {show(given)}")
+    mean, tolerance = match.groups()
+    if not tolerance.endswith("%") and is_plain(mean) != is_plain(tolerance):
+        if is_plain(tolerance):
+            raise InputError(where, f"{show(given)}: the tolerance has no unit")
+        mean += NUMBER.sub("", tolerance, 1)
+    return [mean, tolerance]
 
 
 def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
