@@ -73,37 +73,27 @@ def edited(path):
     path.write_text(path.read_text(encoding="utf-8") + "\n# An edit.\n", encoding="utf-8")
 
 
-@pytest.mark.parametrize("folder", ["plots", "cli", "config", "storage"])
-def test_edit_outside_the_kernels_keeps_the_digest_of_sources(package, folder):
-    before = sources_digest(package)
-    # The designs of samples determine results.
-    edited(next(path for path in (package / folder).glob("*.py") if path.name != "sampling.py"))
-    assert sources_digest(package) == before
-
-
-@pytest.mark.parametrize("folder", ["compile", "numerics", "physics", "models", "solvers", "quantities"])
-def test_edit_in_the_kernels_changes_the_digest_of_sources(package, folder):
-    before = sources_digest(package)
-    assert before == sources_digest(PACKAGE)
-    edited(max((package / folder).rglob("*.py")))
-    assert sources_digest(package) != before
-
-
-@pytest.mark.parametrize("name", ["variables.py", "units.py", "quantity.py"])
-def test_edit_of_names_and_units_keeps_the_compiled_kernels(package, name):
-    before = sources_digest(package, places=IN_KERNELS)
-    assert before == sources_digest(PACKAGE, places=IN_KERNELS)
-    edited(package / "quantities" / name)
-    assert sources_digest(package, places=IN_KERNELS) == before
-
-
 @pytest.mark.parametrize(
-    "name", ["quantities/flags.py", "quantities/parameters.py", "numerics/series.py", "solvers/rk4.py"]
+    ("results", "kernels", "files"),
+    [
+        (False, False, ("plots/maps.py", "cli/entry.py", "config/axes.py", "storage/netcdf.py")),
+        (True, False, ("quantities/variables.py", "quantities/units.py", "quantities/quantity.py")),
+        (True, True, ("quantities/flags.py", "quantities/parameters.py", "numerics/series.py", "solvers/rk4.py")),
+        (True, True, ("compile/options.py", "models/model.py", "physics/drives.py")),
+    ],
+    ids=["neither", "results", "kernels", "more kernels"],
 )
-def test_edit_of_what_kernels_contain_compiles_them_anew(package, name):
-    before = sources_digest(package, places=IN_KERNELS)
-    edited(package / name)
-    assert sources_digest(package, places=IN_KERNELS) != before
+def test_edit_changes_the_digests_of_what_depends_on_it(package, results, kernels, files):
+    """An edit of names and units keeps the compiled kernels, and one of pictures or files keeps the results too."""
+    for name in files:
+        before = sources_digest(package), sources_digest(package, places=IN_KERNELS)
+        edited(package / name)
+        after = sources_digest(package), sources_digest(package, places=IN_KERNELS)
+        assert [one != other for one, other in zip(before, after, strict=True)] == [results, kernels], name
+
+
+def test_digest_is_that_of_the_sources_wherever_they_are(package):
+    assert sources_digest(package) == sources_digest(PACKAGE)
 
 
 def test_kernels_take_nothing_but_flags_and_declarations_from_quantities():
