@@ -43,15 +43,15 @@ def init_command(arguments: argparse.Namespace) -> None:
 def run_command(arguments: argparse.Namespace) -> int:
     """Run a sweep into a file, print a summary and draw the regime map."""
     from ringsweep.config import load, with_refine
+    from ringsweep.runs.plans import plan_of
 
     if arguments.backend == "dask" and arguments.scheduler is None:
         raise InputError("--backend", "dask needs the address of its scheduler: --scheduler ADDRESS")
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
     config = with_refine(load(arguments.config, arguments.set), arguments.refine or None)
-    kind = ("regime", "sweep") if config.sample is None else ("probability", "sampled sweep")
     name = f"{config.name}.nc" if arguments.output is None else arguments.output
-    target, picture = _outputs(name, *kind, (config.begins_from,))
+    target, picture = _outputs(name, *plan_of(config).kind, (config.begins_from,))
 
     if arguments.dry_run:
         from ringsweep.runs.needs import describe
