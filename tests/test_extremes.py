@@ -160,3 +160,22 @@ class TestReactions:
             gap = np.maximum(run.gap_1, run.gap_2)
             assert exceeds(run, "gap_max", gap) <= 3.0
         assert max(least) > 0.0
+
+
+@pytest.mark.slow
+def test_greatest_velocity_within_a_long_step_is_as_exact_as_its_end():
+    """The body creeps with the ring, in steps of a quarter of a period, and is fastest within one of them."""
+    scene = {
+        "model": "ring",
+        "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
+        "ring": {"radius": 0.043378},
+        "friction": {"law": "tanh", "v0": 4.495e-5, "rough": {"mu_k": 0.4833}, "rest": {"mu_k": 0.1869}},
+        "zone": {"half_angle": 1.4457},
+        "drive": {"law": "sinusoidal", "amplitude": 0.3412, "frequency": 0.2382},
+        "initial": {"phi": 0.1688, "omega": 0.0},
+    }
+    found, exact = (
+        ringsweep.sweep(scene, {"time.span": [8.0]}, solver={"method": "implicit", "rtol": rtol}, progress=False)
+        for rtol in (3e-6, 1e-10)
+    )
+    assert abs(found.omega_max - exact.omega_max).item() < 1e-8

@@ -63,12 +63,6 @@ def _from_implicit(scene, forcing, x):
     return x[0] + forcing[0], x[1]
 
 
-@implicit.motion.implements(Ring, BristleRing, Belt, BristleBelt)
-def _motion(scene, forcing, x, linear):
-    radius = ring.radius(scene.body)
-    return x[1] / radius + forcing[1], linear[0][1] / radius + forcing[2]
-
-
 # ---- series ----------------------------------------------------------------------------------
 
 

@@ -10,25 +10,21 @@ from __future__ import annotations
 from math import inf, isfinite
 from typing import Any, NamedTuple
 
-from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
+from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, replacing, take
 from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, modes, recorder, series, simpler, variation
 from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, RUNNING
 from ringsweep.numerics.clock import Instant, later
-from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
-from ringsweep.solvers.creep import StepControl, implicit_step, start_at
+from ringsweep.solvers.creep import StepControl, implicit_step, start_at, start_control
 from ringsweep.solvers.steps import Step, lent, scratch_for, without_rows
 from ringsweep.solvers.taylor import series_step
 from ringsweep.solvers.variation import at_event
 
 # A run ends after this many consecutive steps and events at one instant.
 _MOST_STALLED = 400
-
-#: The second run of a certificate has a tolerance that is looser by this factor.
-FACTOR = 30.0
 
 # By kind of cells: number of series in the table, of components of a state, and row of the first guard.
 _SHAPES: dict[Any, tuple[int, int, int]] = {}
@@ -37,11 +33,15 @@ _SHAPES: dict[Any, tuple[int, int, int]] = {}
 PATIENCE = 1_000_000
 
 
-class LocalErrors(NamedTuple):
-    """Errors of the steps that a run and a run at a tolerance :data:`FACTOR` times looser share.
+_with_length = replacing("h")
 
-    An event, a knot of the drive or the span limits the length of these steps, and not the tolerance. So the difference
-    between the runs does not show their errors.
+
+class LocalErrors(NamedTuple):
+    """Errors of the steps that a run shares with a run at a looser tolerance.
+
+    Something else than the tolerance limits the length of these steps: an event, a knot of the drive, the span, the
+    growth of steps after a start, or the steepness of a friction law. So the difference between the runs does not show
+    their errors.
 
     Attributes
     ----------
@@ -52,28 +52,17 @@ class LocalErrors(NamedTuple):
         from the velocity of the drive at the end of the step.
     implicit : float
         Sum over the implicit steps, in units of the tolerance.
-    creep : float
-        Number of all implicit steps.
     """
 
     series: float
     rate: float
     implicit: float
-    creep: float
-
-
-@inlined
-def _shared(s, reach):
-    """Error of a step of length `s` of a series that meets the tolerance over a length `reach`, if it is shared."""
-    share = s / reach if s > 0.0 else 0.0
-    error = share**ORDER
-    return error if error * FACTOR < 1.0 else 0.0
 
 
 @inlined
 def _after_creep(local, error):
     """Local errors after one more implicit step."""
-    return LocalErrors(local.series, local.rate, local.implicit + error, local.creep + 1.0)
+    return LocalErrors(local.series, local.rate, local.implicit + error)
 
 
 class Run(NamedTuple):
@@ -119,22 +108,21 @@ def _creep(scene, run, h_max, tolerance, scratch):
         return False, -1, 0.0, run.y, run.record, control, 0.0
     if control.last_h == 0.0:
         # The transient into creep decays at this rate.
-        control = StepControl(min(control.h, -1.0 / start.linear[1][3]), 0.0, 0.0)
+        control = StepControl(min(control.h, -1.0 / start.linear[1][3]), 0.0, 0.0, True)
     guard, s, y, record, control, error = implicit_step(scene, run.record, start, control, h_max, tolerance, scratch)
     return True, guard, s, y, record, control, error
 
 
 @_step.implements(SetValued)
 def _step_series(family, scene, run, h_max, tolerances, scratch):
-    guard, s, y, record, reach = series_step(scene, run, h_max, tolerances[0], scratch)
-    shared = _shared(s, reach)
+    guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch)
     rate = 0.0
     if shared > 0.0 and modes.sticks(scene, run.mode):
         # The body moves as the drive does. After an infinite acceleration of the drive steps are so short that a bound
         # that follows from the error of the place, divided by the length of the step, would say nothing.
         velocity = drives.turn(scene.drive, later(run.now, s))[1]
         rate = abs(series.rates_at(scene, scratch.c, s)[0] - velocity) / tolerances[0]
-    local = LocalErrors(run.local.series + shared, run.local.rate + rate, 0.0, 0.0)
+    local = LocalErrors(run.local.series + shared, run.local.rate + rate, 0.0)
     return False, guard, s, y, record, run.control, local
 
 
@@ -151,10 +139,10 @@ def _step_either(family, scene, run, h_max, tolerances, scratch):
         if is_stiff:
             record = _goes_on(scene, run, guard, record)
             return True, guard, s, y, record, control, _after_creep(run.local, error)
-    guard, s, y, record, reach = series_step(scene, run, h_max, tolerances[0], scratch)
+    guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch)
     local, record = run.local, _goes_on(scene, run, guard, record)
-    local = LocalErrors(local.series + _shared(s, reach), local.rate, local.implicit, local.creep)
-    return False, guard, s, y, record, StepControl(1e-6 * scene.span, 0.0, 0.0), local
+    local = LocalErrors(local.series + shared, local.rate, local.implicit)
+    return False, guard, s, y, record, start_control(scene), local
 
 
 @_step.implements(Dynamic)
@@ -322,7 +310,7 @@ class Results(NamedTuple):
         Outcomes. It may have no columns.
     steps : ndarray of shape ``(cells,)``
         Numbers of steps.
-    audits : ndarray of shape ``(cells, 7)`` or ``(0, 7)``
+    audits : ndarray of shape ``(cells, 6)`` or ``(0, 6)``
         Unless empty, the audit of each run: the largest violation of the friction law, in units of the violation that
         the tolerance would explain; the share of the energy turnover that is not work of friction; the rate at which
         the reaction that ended the run fell, N/s, infinite if something else did; :class:`LocalErrors`.
@@ -386,8 +374,8 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         begun = _begin_in(simpler.kind(scene), scene, mode, now, y, tolerances, c)
         record = recorder.lend(scene, begun, take(rows, i))
         record = recorder.after_event(scene, record, mode, mode, t)
-        control = StepControl(1e-6 * scene.span, 0.0, 0.0)
-        audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
+        control = start_control(scene)
+        audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0)
         n = stalled = 0
         t_before, s = t, scene.span
         t_judged, least_gain = t, scene.span * (PATIENCE / max_steps)
@@ -410,7 +398,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             n += 1
             limit = min(scene.span, drives.next_knot(scene.drive, t))
             h_max = _until(limit, now)
-            control = StepControl(min(control.h, spacing), control.last_h, control.last_factor)
+            control = _with_length(control, min(control.h, spacing))
             run = Run(record, mode, now, y, control, local)
             is_implicit, guard, s, y_next, record, control, local = _step_in(
                 simpler.kind(scene), scene, run, h_max, tolerances, scratch

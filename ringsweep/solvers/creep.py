@@ -27,6 +27,10 @@ _ACCELERATION_FACTOR = 100.0
 _EXTREME_PRECISION = 1e-8
 
 
+# Error of the dense output at an extreme, as a share of what the extreme exceeds the ends of the step by.
+_DENSE_ERROR = 0.01
+
+
 class Start(NamedTuple):
     """The beginning of an implicit step.
 
@@ -254,11 +258,20 @@ class StepControl(NamedTuple):
         Length of the last accepted step, s; 0 if there is none.
     last_factor : float
         Factor by which the last accepted step could have been longer.
+    shared : bool
+        Whether a run at a looser tolerance would try the same length: since the start the tolerance limited no step.
     """
 
     h: float
     last_h: float
     last_factor: float
+    shared: bool
+
+
+@inlined
+def start_control(scene):
+    """Control of the first implicit step."""
+    return StepControl(1e-6 * scene.span, 0.0, 0.0, True)
 
 
 @inlined
@@ -274,10 +287,11 @@ def _next_control(control, s, error, shortened, rejected):
     # Towards the end of a creep, steps shorten at a steady rate, which the last step shows (Gustafsson).
     if control.last_h > 0.0:
         h = min(h, s * 0.9 * s / control.last_h * (factor * factor / control.last_factor))
+    shared = control.shared and h == s * _MOST_GROWTH
     # A shortened step says little about the next one.
     if shortened:
-        return StepControl(max(control.h, h), control.last_h, control.last_factor)
-    return StepControl(h, s, factor)
+        return StepControl(max(control.h, h), control.last_h, control.last_factor, shared)
+    return StepControl(h, s, factor, shared)
 
 
 @inlined
@@ -301,8 +315,8 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     -------
     tuple
         The guard that ended the step, or -1; length of the step, s, negative if no step was accepted; state, record and
-        control after it; norm of its error, in units of the tolerance, if a guard, a knot of the drive or the span and
-        not the tolerance limited its length, 0 otherwise.
+        control after it; norm of its error, in units of the tolerance, if something else than the tolerance limited its
+        length, 0 otherwise.
     """
     mode, now, y, x, forcing, common, linear = start
     course, bends = scratch.course, scratch.bends[0]
@@ -337,6 +351,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         near = False
     else:
         return -1, -1.0, y, record, control, 0.0
+    shared = h < s or s == h_max or control.shared
     control = _next_control(control, s, error_norm, s == h_max, s < min(control.h, h_max))
     if event >= 0:
         event += scratch.first_guard
@@ -344,15 +359,11 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             return event, 0.0, y, record, control, 0.0
     taken, fractions, count = Taken(h, x_next), scratch.work[0], 0
     record = recorder.enter(scene, record, now.t, implicit.seen(scene, before))
-    velocity, acceleration = implicit.motion(scene, forcing, x, linear)
-    for begin, view in ((0.0, middle), (0.5, after)):
-        # Where velocity or acceleration change sign, place or velocity have an extreme: the recorder must look there.
-        for component, value_before in ((1, velocity), (2, acceleration)):
-            if value_before * view[1][component] < 0.0:
-                ends = value_before, view[1][component]
-                fractions[count] = _sign_change(scene, start, scratch, taken, begin, component, ends)
-                count += 1
-        velocity, acceleration = view[1][1], view[1][2]
+    # Where the velocity changes sign the place has an extreme: the recorder must look there.
+    for begin, ends in ((0.0, (before[1][1], middle[1][1])), (0.5, (middle[1][1], after[1][1]))):
+        if ends[0] * ends[1] < 0.0:
+            fractions[count] = _sign_change(scene, start, scratch, taken, begin, ends)
+            count += 1
     count = _extremes(scene, record, start, scratch, taken, (before, middle, after), count)
     for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
         fractions[count] = i / INSTANTS
@@ -369,6 +380,11 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         view = after if fraction == 1.0 else middle
         if fraction != 0.5 and fraction != 1.0:
             view = _view_at(scene, start, course, fraction * h, rosenbrock.dense(x, x_next, bends, fraction))
+        if fraction != 1.0 and _sets_record(scene, record, (before, view, after)):
+            # A step of the method is more exact than the dense output, whose error may be that of the whole step.
+            there = implicit.forcing(scene, course, now, fraction * h)
+            state, _ = _step(scene, start, course, fraction * h, there, scratch.bends[1])
+            view = implicit.guards_and_motion(scene, mode, common, there, state)
         duration = (fraction - fraction_before) * h
         ends = fraction_before, fraction
         record = along_implicit(variation.asked(scene), scene, record, start, taken, ends, scratch)
@@ -376,33 +392,55 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             scene, record, later(now, fraction * h).t, duration, stuck, implicit.seen(scene, view)
         )
         fraction_before = fraction
-    return event, h, implicit.from_implicit(scene, end, x_next), record, control, h_norm if h < s or s == h_max else 0.0
+    return event, h, implicit.from_implicit(scene, end, x_next), record, control, h_norm if shared else 0.0
 
 
 @inlined
 def _extremes(scene, record, start, scratch, taken, views, count):
-    """Append to ``work[0]`` the fractions of a step at which a quantity may exceed its recorded extremes.
+    """Append to ``work[0]`` the fractions of a step at which the velocity turns or a force may set a record.
 
     A quantity is taken as the polynomial through its values at five instants. Its value at an extreme does not depend
-    on small errors of the instant.
+    on small errors of the instant. The acceleration would tell the instant worse: where friction rises steeply, it
+    magnifies the error of the dense output.
 
     `views` are those at the beginning, in the middle and at the end of the step; `count` is the number of fractions
     before. The new number is returned.
     """
-    exceeds = False
+    found = False
     first, middle, last = (
         implicit.sought(scene, record, views[0]),
         implicit.sought(scene, record, views[1]),
         implicit.sought(scene, record, views[2]),
     )
-    for q in range(len(first)):
+    for q in range(1, len(first)):
         (a, least, greatest), b, c = first[q], middle[q][0], last[q][0]
         bend = abs(a - 2.0 * b + c)
         # The parabola through the three values is monotonic if their difference is twice as large as its bend.
         turns = abs(c - a) < 4.0 * bend
         beyond = max(a, max(b, c)) + 0.5 * bend > greatest or min(a, min(b, c)) - 0.5 * bend < least
-        exceeds = exceeds or (turns and beyond)
-    return _turns(scene, record, start, scratch, taken, views, count) if exceeds else count
+        # A velocity counts beside its records: between two turns a body may reverse.
+        found = found or (turns and (beyond or q == 1))
+    return _turns(scene, record, start, scratch, taken, views, count) if found else count
+
+
+@inlined
+def _sets_record(scene, record, views):
+    """Whether a quantity in a view within a step lies beyond both ends of the step, and may set a record.
+
+    `views` are those at the beginning, within the step and at its end.
+    """
+    first, within, last = (
+        implicit.sought(scene, record, views[0]),
+        implicit.sought(scene, record, views[1]),
+        implicit.sought(scene, record, views[2]),
+    )
+    found = False
+    for q in range(len(within)):
+        (value, least, greatest), a, b = within[q], first[q][0], last[q][0]
+        above, below = value - max(a, b), min(a, b) - value
+        found = found or (above > 0.0 and value + _DENSE_ERROR * above > greatest)
+        found = found or (below > 0.0 and value - _DENSE_ERROR * below < least)
+    return found
 
 
 @inlined
@@ -419,7 +457,7 @@ def _turns(scene, record, start, scratch, taken, views, count):
         quantities = len(sought)
         for q in range(quantities):
             samples[q, i] = sought[q][0]
-    for q in range(quantities):
+    for q in range(1, quantities):
         for k in range(ORDER + 1):
             row[k] = 0.0
             if k < INSTANTS:
@@ -430,11 +468,11 @@ def _turns(scene, record, start, scratch, taken, views, count):
 
 
 @inlined
-def _sign_change(scene, start, scratch, taken, begin, component, ends):
-    """Fraction of a step at which velocity (component 1) or acceleration (component 2) of the body change sign.
+def _sign_change(scene, start, scratch, taken, begin, ends):
+    """Fraction of a step at which the velocity of the body changes sign.
 
-    The sign changes in the half step that begins at the fraction `begin`; `ends` are the values of the component at
-    both ends of the half step.
+    The sign changes in the half step that begins at the fraction `begin`; `ends` are the velocities at both ends of the
+    half step.
     """
     (first, last), low, high = ends, begin, begin + 0.5
     found, side = low, 0
@@ -445,7 +483,7 @@ def _sign_change(scene, start, scratch, taken, begin, component, ends):
         if abs(found - before) <= _EXTREME_PRECISION:
             break
         state = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], found)
-        there = _view_at(scene, start, scratch.course, found * taken.h, state)[1][component]
+        there = _view_at(scene, start, scratch.course, found * taken.h, state)[1][1]
         # Illinois algorithm: an end of the bracket that stays twice loses half its value.
         if there * first > 0.0:
             low, first = found, there

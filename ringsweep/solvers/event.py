@@ -17,9 +17,10 @@ from ringsweep.models.sliding import REACTION_TOLERANCE
 from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
+from ringsweep.physics.friction.velocity import varies
 from ringsweep.quantities.flags import CERTIFIED, DIVERGES, FAILED, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.solvers.automaton import FACTOR, PATIENCE, History, LocalErrors, Results, integrate
+from ringsweep.solvers.automaton import PATIENCE, History, LocalErrors, Results, integrate
 from ringsweep.solvers.certificate import (
     TwoRuns,
     apart,
@@ -31,6 +32,7 @@ from ringsweep.solvers.certificate import (
     with_errors,
 )
 from ringsweep.solvers.method import Method, Needs, Result
+from ringsweep.solvers.steps import FACTOR
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
 _MOST_STEPS = 100_000_000
@@ -38,20 +40,18 @@ _MOST_STEPS = 100_000_000
 # A cell without a certificate is run again with a tolerance that is tighter by FACTOR, at most so many times.
 _MOST_RETRIES = 3
 
-# Under a smooth law the errors of two runs are as good as independent: their signs and sizes depend on where steps end.
-# So a difference may be small by chance, and with it all numbers of a run, which have the error of its last breakaway.
-# Where runs differ by less than this share of the tolerance, a third one at a looser tolerance, by FACTOR / _THIRD, is
-# asked. Two differences are hardly small together.
-_CLOSE, _THIRD = 0.035, 3.0
-
 # Errors of a run that the difference from the second run does not show, found by experiment, see docs/accuracy.md. In
-# units of the remainder of a series: once in a run, and for each shared step. In units of the tolerance of an implicit
-# step: once in a run with bristles; for each shared step under smooth laws; and for each with bristles, whose fast
-# vibrations all runs damp.
-_ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT, _SHARED_BRISTLES = 0.2, 3.0, 0.05, 0.02, 0.1
+# units of the remainder of a series: once in a run, and for each shared step; of forces, in units of the remainder that
+# their tolerance allows, since within a step they come from the series. In units of the tolerance of an implicit step:
+# once in a run with bristles; for each shared step under smooth laws; and for each with bristles, whose fast vibrations
+# all runs damp.
+_ONCE, _SHARED, _SHARE_OF_REACTIONS = 0.2, 3.0, 0.05
+_ONCE_IMPLICIT, _SHARED_IMPLICIT, _SHARED_BRISTLES = 0.05, 0.05, 0.2
 
-# Share of the largest relative difference that counts in every number of a run with bristles.
-_SHARE_BRISTLES = 0.2
+# Largest error of a run, in units of its difference from the run at the looser tolerance, and share of the largest
+# relative difference that counts in every number. Where friction varies with the speed, the errors of both runs are as
+# good as independent: where steps end decides their signs and sizes.
+_SAFETY_AND_SHARE = {"constant": (0.8, 0.04), "varying": (2.0, 0.05), "bristles": (2.0, 0.2)}
 
 # Impacts magnify the errors before them: a small difference of two runs is then less certain by this factor.
 _MAGNIFIED = 3.0
@@ -74,10 +74,6 @@ class _Piecewise(Method):
     """Integration of a piecewise-smooth system, and its certificate."""
 
     families: ClassVar[tuple[type, ...]]
-    safety: ClassVar[float]
-    """Largest error of a run, in units of its difference from the run at the looser tolerance."""
-    share: ClassVar[float]
-    """Share of the largest relative difference that counts in every number."""
 
     rtol: float
     max_steps: int = _MOST_STEPS
@@ -131,10 +127,6 @@ class _Piecewise(Method):
         cells = audit.disturbed(_select(batch, open_cells))
         second_rows, more_steps, _ = self.integrate(cells, len(outcomes), audit=False, tolerances=looser)
         new = Results(rows[open_cells], steps[open_cells], audits[open_cells])
-        if family_of(type(batch.law)) is Smooth:
-            self._ask_a_third(
-                TwoRuns(cells, new.rows, second_rows, outcomes), LocalErrors(*new.audits.T[3:]), more_steps
-            )
         for retry in range(_MOST_RETRIES + 1):
             runs = TwoRuns(_select(batch, open_cells), new.rows, second_rows, outcomes)
             because[open_cells], bounds[open_cells], distance[open_cells], may_converge = finer._compare(
@@ -192,22 +184,23 @@ class _Piecewise(Method):
             [(because != CERTIFIED, because), (~obeys_law, LAW_NOT_OBEYED), (chaotic, DIVERGES)], len(rows)
         )
         tolerance, implicit_tolerance = self.tolerances()
-        local, share = LocalErrors(*audits[:, 3:].T), self.share
+        local = LocalErrors(*audits[:, 3:].T)
         if of_bristles:
-            floor, share = implicit_tolerance * (_ONCE_IMPLICIT + _SHARED_BRISTLES * local.implicit), _SHARE_BRISTLES
-            force_floor = 0.0
+            floor, force_floor = implicit_tolerance * (_ONCE_IMPLICIT + _SHARED_BRISTLES * local.implicit), 0.0
         else:
             # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
             ratio = tolerance ** (1.0 / ORDER)
             remainder = tolerance * ratio / (1.0 - ratio)
-            floor, force_floor = remainder * (_ONCE + _SHARED * local.series), REACTION_TOLERANCE * remainder
+            floor = remainder * (_ONCE + _SHARED * local.series)
+            force_floor = _SHARE_OF_REACTIONS * REACTION_TOLERANCE * remainder
             floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         magnified, left_out = audit.magnified(batch, rows)
-        safety = np.where(magnified, _MAGNIFIED, 1.0) * self.safety
+        is_constant = family_of(type(batch.law)) is SetValued and not varies(take(batch, 0).law, 0)
+        safety, share = _SAFETY_AND_SHARE["constant" if is_constant else "bristles" if of_bristles else "varying"]
         bounds = errors(
             runs,
-            safety=safety,
+            safety=np.where(magnified, _MAGNIFIED, 1.0) * safety,
             share=share,
             steps=steps,
             floor=floor + left_out,
@@ -222,23 +215,6 @@ class _Piecewise(Method):
         """Tolerances of the second run of a certificate, as :meth:`tolerances` returns them."""
         tolerance, implicit_tolerance = self.tolerances()
         return tolerance * FACTOR, implicit_tolerance * FACTOR
-
-    def _ask_a_third(self, runs: TwoRuns, local: LocalErrors, steps: NDArray[Any]) -> None:
-        """Move second runs that are close to the first to where third runs say that they would be expected.
-
-        `steps` of the second runs grow by those of the third.
-        """
-        batch, rows, second_rows, outcomes = runs
-        close = np.flatnonzero((apart(runs) < _CLOSE * self.tolerances()[1]) & (local.creep > 0.0))
-        if len(close):
-            tolerance, implicit_tolerance = self.looser()
-            tolerances = tolerance, implicit_tolerance / _THIRD
-            third = self.integrate(_select(batch, close), len(outcomes), audit=False, tolerances=tolerances)
-            with np.errstate(invalid="ignore"):
-                moved = _THIRD * (third.rows - rows[close])
-                farther = np.abs(moved) > np.abs(second_rows[close] - rows[close])
-            second_rows[close] = np.where(farther, rows[close] + moved, second_rows[close])
-            steps[close] += third.steps
 
     def integrate(
         self, batch: Any, width: int, *, audit: bool, tolerances: tuple[float, float] | None = None
@@ -261,7 +237,7 @@ class _Piecewise(Method):
         Results
         """
         cells = len(batch.span)
-        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, 7)))
+        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, 6)))
         no_history = History(np.inf, np.empty(0), np.empty((0, 0)))
         integrate(batch, tolerances or self.tolerances(), self.max_steps, results, no_history)
         return results
@@ -272,7 +248,7 @@ class _Piecewise(Method):
         size = 4 * samples
         while True:
             history = History(spacing, np.empty(size), np.empty((size, width)))
-            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 7)))
+            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 6)))
             count = integrate(batch, self.tolerances(), self.max_steps, no_results, history)
             if count < size or size >= self.max_steps:
                 return history.times[:count], history.table[:count]
@@ -285,8 +261,6 @@ class Event(_Piecewise):
 
     name: ClassVar[str] = "event"
     families: ClassVar[tuple[type, ...]] = (SetValued,)
-    safety: ClassVar[float] = 0.8
-    share: ClassVar[float] = 0.04
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-15, upper=1e-3)] = 1e-10
     max_steps: Annotated[int, LIMIT] = _MOST_STEPS
@@ -303,8 +277,6 @@ class Implicit(_Piecewise):
 
     name: ClassVar[str] = "implicit"
     families: ClassVar[tuple[type, ...]] = (Smooth, Dynamic)
-    safety: ClassVar[float] = 2.0
-    share: ClassVar[float] = 0.05
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
     max_steps: Annotated[int, LIMIT] = _MOST_STEPS

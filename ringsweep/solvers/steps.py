@@ -12,6 +12,9 @@ from ringsweep.numerics.series import STACK
 from ringsweep.numerics.terms import COLUMNS
 from ringsweep.physics import drives
 
+#: The second run of a certificate has a tolerance that is looser by this factor.
+FACTOR = 30.0
+
 # Parts into which an implicit step is divided to look for roots of the guards, and largest number of guards.
 INSTANTS, MOST_GUARDS = 4, 6
 

@@ -12,6 +12,7 @@ from ringsweep.models.interface import modes, recorder, series, variation
 from ringsweep.numerics.clock import later
 from ringsweep.numerics.series import ORDER, ascending, first_root
 from ringsweep.numerics.terms import powers, terms, total
+from ringsweep.solvers.steps import FACTOR
 from ringsweep.solvers.variation import along_series, enter_series
 
 _with_record = replacing("record")
@@ -49,6 +50,17 @@ def _first_event(c, first, entry_guard, h, work):
 
 
 @inlined
+def _shared(s, h, reach):
+    """Error of a step, in units of the tolerance, if a run at a looser tolerance takes the same step; else 0.
+
+    The length of the step is `s`, without an event `h`; the tolerance allows the length `reach`, s.
+    """
+    error = (s / reach) ** ORDER if s > 0.0 else 0.0
+    # The looser run needs no shorter step up to the event, or is limited to the same length.
+    return error if error * FACTOR < 1.0 or s == h < reach else 0.0
+
+
+@inlined
 def _observe(scene, run, s, scratch):
     """Record after a step of length `s` of the series, with the extremes within the step."""
     c, instants = scratch.c, scratch.work[0]
@@ -61,7 +73,8 @@ def _observe(scene, run, s, scratch):
         now = instants[j] if j < count else s
         record = along_series(variation.asked(scene), scene, record, run, (before, now), scratch)
         t = later(run.now, now).t
-        record = recorder.observe(scene, record, t, now - before, stuck, series.seen_at(scene, c, now, s))
+        seen = series.seen_at(scene, run.mode, c, now, s)
+        record = recorder.observe(scene, record, t, now - before, stuck, seen)
         before = now
     return record
 
@@ -85,13 +98,13 @@ def series_step(scene, run, h_max, tolerance, scratch):
     Returns
     -------
     tuple
-        The guard that ended the step, or -1; length of the step, s; state and record after it; length over which the
-        series meets the tolerance, s.
+        The guard that ended the step, or -1; length of the step, s; state and record after it; error of the step, in
+        units of the tolerance, if a run at a looser tolerance takes the same step, 0 otherwise.
     """
     c = scratch.c
-    reach = series.expand(scene, run.mode, run.now, run.y, tolerance, c)
+    longest, reach = series.expand(scene, run.mode, run.now, run.y, tolerance, c)
     run = _with_record(run, enter_series(variation.asked(scene), scene, run.record, run.mode, c))
-    h = min(reach, h_max)
+    h = min(longest, h_max)
     guard, s = _first_event(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)
     record = _observe(scene, run, s, scratch) if s > 0.0 else run.record
-    return guard, s, series.state_at(scene, c, s), record, reach
+    return guard, s, series.state_at(scene, c, s), record, _shared(s, h, reach)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import inf, nan
 
 from ringsweep.compile import inlined, unrolled
 from ringsweep.models.belt.force import if_force, length_scale, located
@@ -71,7 +71,9 @@ def _seen(scene, view):
 
 @implicit.sought.implements(belt.Belt, belt.BristleBelt)
 def _sought(scene, record, view):
-    return ((view[1][3], -record.force_max, record.force_max),)
+    r, motion = record, view[1]
+    place, velocity = (motion[0], r.x_min, r.x_max), (motion[1], -inf, r.velocity_max)
+    return place, velocity, (motion[3], -r.force_max, r.force_max)
 
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)

@@ -39,6 +39,7 @@ from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import (
     KINETIC,
     begin_series,
+    friction_in,
     no_products,
     region_at,
     region_bounds,
@@ -245,7 +246,7 @@ def _expand(scene, mode, t, y, tolerance, c):
         per_force = 1.0 / (scale * tolerance)
     units = (X, 1.0 / (length * tolerance)), (V, 1.0 / (speed * tolerance)), (SLOW, per_force)
     h = step_within(c, units)
-    return h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)
+    return (h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)), h
 
 
 @inlined
@@ -319,15 +320,21 @@ def _seen_sliding(scene, v, difference):
 
 
 @series.seen_at.implements(belt.Belt)
-def _seen_at(scene, c, s, h):
+def _seen_at(scene, mode, c, s, h):
     velocity = value(c[VELOCITY], s)
     if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
-    x = value(c[X], s)
-    acceleration = located(scene, x, value(c[ACCELERATION], s))
-    v = _seen_sliding(scene, value(c[V], s), value(c[VELOCITY], s) - slope(c[SHIFT], s))
-    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), v, slope(c[V], s), acceleration, nan
+    x, v, force, acceleration = value(c[X], s), value(c[V], s), value(c[FORCE], s), value(c[ACCELERATION], s)
+    yielding = holds_in_band(scene.law) and mode.region < 0
+    if s == h and mode.sign != 0 and not yielding:
+        sign, body = float(mode.sign), scene.body
+        mu, _ = friction_in(scene.law, mode.region, sign * v, (scene.mu_s, scene.mu_k))
+        load, _ = ring.reactions(body, 0.0, 0.0, (x, 0.0, velocity))
+        before, force = force, sign * mu * load + if_force(body, scene.viscous, 0.0) * v
+        acceleration += (before - force) / body.mass
+    v = _seen_sliding(scene, v, value(c[VELOCITY], s) - slope(c[SHIFT], s))
+    return x, velocity, force, x - value(c[SHIFT], s), v, slope(c[V], s), located(scene, x, acceleration), nan
 
 
 @series.extremes.implements(belt.Belt)

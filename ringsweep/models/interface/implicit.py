@@ -268,28 +268,6 @@ def near_zero(scene, motion):
 
 
 @hook
-def motion(scene, forcing, x, linear):
-    """Velocity and acceleration of the body in space.
-
-    Parameters
-    ----------
-    scene : NamedTuple
-        One cell.
-    forcing : tuple of float
-        Forcing at the time of the state.
-    x : tuple of float
-        State of an implicit step.
-    linear : tuple
-        What :func:`linearise` returned for this state.
-
-    Returns
-    -------
-    tuple of float
-        ``(velocity, acceleration)``: rad/s and rad/s^2, or m/s and m/s^2.
-    """
-
-
-@hook
 def seen(scene, view):
     """A state as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
 
@@ -308,7 +286,7 @@ def seen(scene, view):
 
 @hook
 def sought(scene, record, view):
-    """Quantities whose extremes the record keeps, beside place and velocity.
+    """Quantities whose extremes the record keeps: place, velocity, and others.
 
     Parameters
     ----------
@@ -320,7 +298,8 @@ def sought(scene, record, view):
     Returns
     -------
     tuple of tuple of float
-        For each quantity its value in the state, and the least and the greatest value recorded.
+        For each quantity its value in the state, and the least and the greatest value recorded; infinite if the record
+        does not keep it.
     """
 
 
@@ -345,4 +324,4 @@ def row(scene, mode, forcing, x):
 
 
 #: Functions without a default, but for :func:`is_stiff`, which only smooth laws need.
-MEMBERS = (rates, linearise, error_scales, guards_and_motion, near_zero, motion, seen, sought, row)
+MEMBERS = (rates, linearise, error_scales, guards_and_motion, near_zero, seen, sought, row)

@@ -49,8 +49,8 @@ def expand(scene, mode, t, y, tolerance, c):
 
     Returns
     -------
-    float
-        Length of the step over which the series meets the tolerance, s.
+    tuple of float
+        Greatest length of the step, and length over which the series meets the tolerance, s.
     """
 
 
@@ -111,13 +111,15 @@ def seen_at_start(scene, c):
 
 
 @hook
-def seen_at(scene, c, s, h):
+def seen_at(scene, mode, c, s, h):
     """State within a step as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
+
+    At the end of the step, where a series of friction is least exact, forces follow from the law and the state.
 
     Parameters
     ----------
-    scene : NamedTuple
-        One cell.
+    scene, mode : NamedTuple
+        One cell, and its mode.
     c : ndarray of shape ``(rows, columns)``
         Table of the step.
     s : float

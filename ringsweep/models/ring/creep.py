@@ -13,6 +13,7 @@ from ringsweep.compile import inlined, unrolled
 from ringsweep.models.interface import implicit
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zones_under
+from ringsweep.models.ring.record import sought
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.numerics.functions import ROTATED, rotated, sine_cosine_from
 from ringsweep.numerics.terms import joined
@@ -117,8 +118,8 @@ def _seen(scene, view):
 
 @implicit.sought.implements(ring.Ring, ring.BristleRing)
 def _sought(scene, record, view):
-    r, guards = record, view[0]
-    return (guards[NORMAL_1], r.normal_min_1, r.normal_max_1), (guards[NORMAL_2], r.normal_min_2, r.normal_max_2)
+    guards, motion = view
+    return sought(record, motion[0], motion[1], guards[NORMAL_1], guards[NORMAL_2])
 
 
 @implicit.row.implements(ring.Ring, ring.BristleRing)

@@ -130,6 +130,18 @@ def observe(record, shocks, stuck_for, seen, epsilon_omega):
 
 
 @inlined
+def sought(record, phi, omega, normal_1, normal_2):
+    """What :func:`ringsweep.models.interface.implicit.sought` returns for these values."""
+    r = record
+    return (
+        (phi, min(r.phi_min, r.lowest), max(r.phi_max, r.highest)),
+        (omega, r.omega_min, r.omega_max),
+        (normal_1, r.normal_min_1, r.normal_max_1),
+        (normal_2, r.normal_min_2, r.normal_max_2),
+    )
+
+
+@inlined
 def turns_of(record):
     """Number of full turns since the last reversal, or since the start."""
     return min(np.floor((record.highest - record.lowest) / (2.0 * pi)), MOST_TURNS)

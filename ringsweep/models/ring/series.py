@@ -410,7 +410,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     per_reaction = per_epsilon / (scene.body.mass * scene.body.radius)
     reactions = (NORMAL_1, per_reaction), (NORMAL_2, per_reaction)
     h = step_within(c, ((PHI, per_angle), (V, per_velocity), (EPSILON, per_epsilon), *reactions))
-    return shorten_for_decay(sharpness, c[V], h)
+    return shorten_for_decay(sharpness, c[V], h), h
 
 
 def _expand_slip(law, scene, mode, c):
@@ -525,7 +525,7 @@ def _expand_slip_guards(scene, mode, c):
 
 @inlined
 def _expand_stick(scene, mode, tolerance, c):
-    """Fill the series of stick and return the length of the step; the body moves with the ring."""
+    """Fill the series of stick and return what :func:`series.expand` does; the body moves with the ring."""
     phi_0, omega_0 = c[PHI, 0], c[THETA, 1]
     sin_0, cos_0 = sin(phi_0), cos(phi_0)
     c[V, 0], c[OMEGA, 0], c[EPSILON, 0] = 0.0, omega_0, 2.0 * c[THETA, 2]
@@ -549,7 +549,8 @@ def _expand_stick(scene, mode, tolerance, c):
     c[DETERMINANT, 0] = inf
     one = 1.0 / tolerance
     per_load = one / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
-    return step_within(c, ((PHI, one), (SIN, one), (COS, one), (SLOW, per_load), (FAST, per_load)))
+    h = step_within(c, ((PHI, one), (SIN, one), (COS, one), (SLOW, per_load), (FAST, per_load)))
+    return h, h
 
 
 @inlined
@@ -602,9 +603,15 @@ def _seen_at_start(scene, c):
 
 
 @series.seen_at.implements(ring.Ring)
-def _seen_at(scene, c, s, h):
-    acceleration = _acceleration(scene, c, value(c[EPSILON], s))
-    return value(c[PHI], s), value(c[OMEGA], s), value(c[NORMAL_1], s), value(c[NORMAL_2], s), acceleration
+def _seen_at(scene, mode, c, s, h):
+    phi, omega, epsilon = value(c[PHI], s), value(c[OMEGA], s), value(c[EPSILON], s)
+    normal_1, normal_2 = value(c[NORMAL_1], s), value(c[NORMAL_2], s)
+    if s == h and mode.sign != 0:
+        K1, K2 = friction_under(scene, mode, abs(value(c[V], s)))
+        motion = value(c[SIN], s), value(c[COS], s), omega
+        epsilon, _ = ring.acceleration(scene.body, K1, K2, motion)
+        normal_1, normal_2 = ring.reactions(scene.body, K1, K2, motion)
+    return phi, omega, normal_1, normal_2, _acceleration(scene, c, epsilon)
 
 
 @inlined

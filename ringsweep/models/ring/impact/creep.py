@@ -25,6 +25,7 @@ from ringsweep.models.ring.impact.mode import (
     ring_of,
 )
 from ringsweep.models.ring.impact.rows import row_of
+from ringsweep.models.ring.record import sought
 from ringsweep.models.sliding import rate_at_rest
 from ringsweep.physics import drives, pivot, ring
 from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
@@ -208,12 +209,6 @@ def _near_zero(scene, motion):
     return motion.determinant, 0.0, motion.load_1, motion.load_2, 0.0, 0.0
 
 
-@implicit.motion.implements(ImpactRing)
-def _motion(scene, forcing, x, linear):
-    rates, (_, ring_omega, ring_epsilon), radius, rho = linear[0], forcing, scene.closed.body.radius, scene.balls.reach
-    return (x[1] + rho * x[3]) / radius + ring_omega, (rates[1] + rho * rates[3]) / radius + ring_epsilon
-
-
 @implicit.seen.implements(ImpactRing)
 def _seen(scene, view):
     m = view[1]
@@ -224,9 +219,9 @@ def _seen(scene, view):
 
 @implicit.sought.implements(ImpactRing)
 def _sought(scene, record, view):
-    m, r, most = view[1], record.base, record.gap_max
-    reactions = (m.normal_1, r.normal_min_1, r.normal_max_1), (m.normal_2, r.normal_min_2, r.normal_max_2)
-    return (*reactions, (m.gap_1, 0.0, most), (m.gap_2, 0.0, most))
+    m, most = view[1], record.gap_max
+    closed = sought(record.base, m.psi, m.psi_dot, m.normal_1, m.normal_2)
+    return (*closed, (m.gap_1, 0.0, most), (m.gap_2, 0.0, most))
 
 
 @implicit.row.implements(ImpactRing)

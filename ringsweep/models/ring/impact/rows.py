@@ -59,4 +59,4 @@ def row_of(scene, mode, forcing, y, seen):
 @series.row.implements(ImpactRing)
 def _row(scene, mode, c, t, s):
     forcing = drives.turn(scene.drive, t)
-    return row_of(scene, mode, forcing, series.state_at(scene, c, s), series.seen_at(scene, c, s, s))
+    return row_of(scene, mode, forcing, series.state_at(scene, c, s), series.seen_at(scene, mode, c, s, s))

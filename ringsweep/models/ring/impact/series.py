@@ -131,7 +131,8 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     own = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
     motion = (RING + PHI, per_angle), (ETA, per_angle), (RING + V, per_angle / speed)
     loads = (RING + EPSILON, per_load * balls.reach / load), (own, per_load / (body.mass * load))
-    return shorten_for_decay(sharpness, c[RING + V], step_within(c, (*motion, *loads)))
+    h = step_within(c, (*motion, *loads))
+    return shorten_for_decay(sharpness, c[RING + V], h), h
 
 
 @inlined
@@ -261,7 +262,7 @@ def _divide(c, row, quotient, zeros):
 
 @inlined
 def _expand_flight(scene, mode, y, tolerance, c):
-    """Fill the series of a parabola with constant spin, and of both gaps; return the length of the step."""
+    """Fill the series of a parabola with constant spin, and of both gaps; return what :func:`series.expand` does."""
     body, balls = scene.closed.body, scene.balls
     psi, spin, x, x_dot, y_0, y_dot, _ = y
     for row in (X, Y):
@@ -291,7 +292,8 @@ def _expand_flight(scene, mode, y, tolerance, c):
             _divide(c, gap, guard, found)
             last = max(last, abs(c[gap, ORDER]) / (balls.reach * tolerance))
             previous = max(previous, abs(c[gap, ORDER - 1]) / (balls.reach * tolerance))
-    return min(h, step_size(last, previous))
+    reach = step_size(last, previous)
+    return min(h, reach), reach
 
 
 @inlined
@@ -401,7 +403,7 @@ def _seen_at_start(scene, c):
 
 
 @series.seen_at.implements(ImpactRing)
-def _seen_at(scene, c, s, h):
+def _seen_at(scene, mode, c, s, h):
     return _seen(scene, c, s)
 
 
