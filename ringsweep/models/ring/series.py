@@ -396,10 +396,11 @@ def _expand(scene, mode, t, y, tolerance, c):
     if mode.sign == 0:
         return _expand_stick(scene, mode, tolerance, c)
     c[OMEGA, 0] = ring.angular_velocity(scene.body, y[1], c[THETA, 1])
-    sharpness = _expand_slip(scene.law, scene, mode, c)
-    _expand_slip_guards(scene, mode, c)
+    # These divisions wait for nothing, and need not be waited for if they come first.
     per_angle = 1.0 / tolerance
     per_velocity = per_angle / speed_in(scene, mode, scene.body.radius * (rate_at_rest(scene) + abs(c[OMEGA, 0])))
+    sharpness = _expand_slip(scene.law, scene, mode, c)
+    _expand_slip_guards(scene, mode, c)
     # An error of the reactions could add or hide a separation. A bound on the acceleration is not enough: varying
     # friction changes the reactions even of a body that is too inert to be accelerated.
     per_load = 1.0 / REACTION_TOLERANCE * per_angle
