@@ -397,7 +397,7 @@ def _reach(course):
     return reach
 
 
-@hook(optional=True)
+@hook(absorb=True, optional=True)
 def turn_near(drive, course, now, s):
     """What :func:`turn` returns the time `s` after another time, but faster where the series of a course reaches.
 

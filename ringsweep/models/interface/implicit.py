@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import absorbed, hook
 from ringsweep.physics import drives
 
 #: Tolerance of an implicit step, in units of the tolerance of the series.
@@ -67,7 +67,7 @@ def is_stiff(scene, mode, y, linear):
     """
 
 
-@inlined
+@absorbed
 def forcing(scene, course, now, s):
     """Forcing the time `s` after another time.
 
