@@ -159,6 +159,13 @@ class TestCommand:
         with pytest.raises(InputError, match=r"pip install 'ringsweep\[fit\]'"):
             ringsweep.fit(BELT, {"t": [1.0], "x": [0.1]}, "friction.mu_k")
 
+    def test_an_angle_is_drawn_in_the_unit_of_all_pictures(self):
+        about = {"units": "rad", "long_name": "angle"}
+        columns = {name: ("measurement", [0.0, np.pi], about) for name in ("measured", "fitted", "residual")}
+        above, below = plots.fit(xr.Dataset(columns, {"t": ("measurement", [0.0, 1.0])})).axes
+        assert (above.get_ylabel(), below.get_ylabel()) == ("angle (°)", "residual (°)")
+        assert [line.get_ydata()[-1] for axes in (above, below) for line in axes.lines] == [180.0, 180.0, 0.0, 180.0]
+
     def test_a_sweep_is_no_fit(self):
         with pytest.raises(InputError, match="is no fit"):
             plots.fit(ringsweep.simulate(BELT))

@@ -835,6 +835,12 @@ def test_history_marks_the_separation_within_its_frame():
     assert "separates" not in said(plots.history(separated().sel(time=slice(0, 5))).axes[3])
 
 
+def test_a_small_displacement_is_drawn_in_millimetres():
+    ds = make_history(ring=False)
+    small = ds.assign(x=(1e-3 / abs(ds.x).max() * ds.x).assign_attrs(ds.x.attrs))
+    assert [plots.history(run).axes[0].get_ylabel() for run in (ds, small)] == ["displacement (m)", "displacement (mm)"]
+
+
 def test_history_of_many_cycles_is_a_band_with_the_last_cycles_beside_it():
     ds = make_history(40_000, ring=False)
     assert len(plots.history(make_history(ring=False)).axes) == 3

@@ -76,6 +76,27 @@ class TestThreshold:
         assert cli.main([*asked, "--set", "friction.mu_s=0.2"]) == 2
         assert "friction.mu_s: is swept here" in capsys.readouterr().err
 
+    def test_answer_has_the_unit_in_which_the_number_was_written(self, tmp_path, capsys):
+        """k v T = mu_s m g: the mass is 1.359157 kg."""
+        config = tmp_path / "belt.yaml"
+        sweep = {"grid": {"body.mass": {"linspace": ["1000 g", "2000 g", 5]}}}
+        config.write_text(json.dumps({"scene": BELT, "sweep": sweep}))
+        asked = ["threshold", str(config), "--path", "body.mass", "--regime", "riding", "--scan", "5"]
+        for more, mass, ends in (
+            ([], "1359.15", "1000 g to 2000 g"),
+            (["--from", "1 kg", "--to", "2 kg"], "1.35915", "1 kg to 2 kg"),
+            (["--unit", "lb"], "2.99642", "2.20462 lb to 4.40925 lb"),
+        ):
+            assert cli.main([*asked, *more]) == 0
+            said = capsys.readouterr().out
+            assert f"riding begins at body.mass = {mass}" in said
+            assert f"scan: 5 runs from {ends}" in said
+        assert cli.main([*asked, "--unit", "rpm"]) == 2
+        assert "is in kg" in capsys.readouterr().err
+        assert cli.main(["run", str(config), "-o", str(tmp_path / "belt.nc")]) == 0
+        assert cli.main(["info", str(tmp_path / "belt.nc")]) == 0
+        assert "body_mass: 1000 to 2000 g" in capsys.readouterr().out
+
     def test_interval_without_a_change_has_no_threshold(self, tmp_path, capsys):
         config = tmp_path / "belt.yaml"
         config.write_text(json.dumps({"scene": BELT, "sweep": {"grid": {"friction.mu_s": [0.3, 0.4]}}}))

@@ -155,7 +155,8 @@ def threshold_command(arguments: argparse.Namespace) -> None:
     from ringsweep.runs.thresholds import in_words, locate
 
     asked = arguments.config, arguments.path, arguments.regime, (arguments.low, arguments.high), arguments.tolerance
-    print(in_words(locate(*asked, scan=arguments.scan, settings=arguments.set, jobs=arguments.jobs)))
+    options = {"scan": arguments.scan, "jobs": arguments.jobs, "unit": arguments.unit}
+    print(in_words(locate(*asked, settings=arguments.set, **options)))
 
 
 def fit_command(arguments: argparse.Namespace) -> None:
@@ -259,7 +260,9 @@ def _print_summary(name: str, result: Any) -> None:
     import json
 
     from ringsweep.quantities.quantity import after_number
+    from ringsweep.quantities.variables import in_unit, written_unit
 
+    configuration = json.loads(result.attrs.get("configuration", "{}"))
     print(result.attrs.get("title", name))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
@@ -269,6 +272,8 @@ def _print_summary(name: str, result: Any) -> None:
             print(f"  {name}: {', '.join(dict.fromkeys(map(str, axis.values.flat)))}")
             continue
         if axis.size:
+            with suppress(InputError):
+                axis = in_unit(axis, written_unit(configuration, axis.attrs.get("path", "")))
             unit = after_number(axis.attrs.get("units", "1"))
             print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{unit}")
     if not {"contender", "time"} & set(result.dims):
@@ -283,7 +288,6 @@ def _print_summary(name: str, result: Any) -> None:
         from ringsweep.cli.report import summarise
 
         summarise(result)
-    configuration = json.loads(result.attrs.get("configuration", "{}"))
     print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))
     print("versions:", result.attrs["ringsweep_version"], result.attrs.get("versions", ""))
 

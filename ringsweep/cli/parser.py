@@ -103,6 +103,7 @@ def build_parser() -> argparse.ArgumentParser:
     _option(threshold, "--from VALUE", "where to look; default: as the sweep has it", dest="low")
     _option(threshold, "--to VALUE", "units allowed", dest="high")
     _option(threshold, "--tolerance T", "largest error (default: 1e-6 of the greatest value)")
+    _option(threshold, "--unit U", "unit of the answer: rpm (default: as the ends or the file have it)")
     _option(threshold, "--scan N", "runs in which changes of regime are looked for (default: 128)", type=whole_number)
     _option(threshold, *_JOBS, type=whole_number)
     _option(threshold, *_SET, **_LIST)

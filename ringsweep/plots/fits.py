@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
+from ringsweep.plots.labels import displayed, long_name, unit_text
 from ringsweep.plots.look import PAIR_COLOURS, SMALL, figure_width, legend_above, on_page, small_ticks
 
 
@@ -43,14 +44,15 @@ def fit(ds: xr.Dataset) -> Figure:
     figure = Figure(figsize=(figure_width(), 0.7 * figure_width()), layout="constrained")
     data, rest = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     one, two = (on_page(colour) for colour in PAIR_COLOURS)
-    time, about = ds["t"].values, ds["measured"].attrs
-    data.plot(time, ds["measured"].values, ".", color=two, markersize=3, label="measured")
-    data.plot(time, ds["fitted"].values, color=one, label="fitted")
-    data.set_ylabel(f"{textwrap.fill(about['long_name'], 18)} ({about['units']})", fontsize=SMALL)
+    time, unit = ds["t"].values, unit_text(ds["measured"])
+    measured, fitted, residual = (displayed(ds[name]).values for name in ("measured", "fitted", "residual"))
+    data.plot(time, measured, ".", color=two, markersize=3, label="measured")
+    data.plot(time, fitted, color=one, label="fitted")
+    data.set_ylabel(f"{textwrap.fill(long_name(ds['measured']), 18)} ({unit})", fontsize=SMALL)
     legend_above(data)
     rest.axhline(0.0, color=one, linewidth=1.0)
-    rest.plot(time, ds["residual"].values, ".", color=two, markersize=3)
+    rest.plot(time, residual, ".", color=two, markersize=3)
     rest.set_xlabel("time (s)", fontsize=SMALL)
-    rest.set_ylabel(f"residual ({about['units']})", fontsize=SMALL)
+    rest.set_ylabel(f"residual ({unit})", fontsize=SMALL)
     small_ticks(data, rest)
     return figure

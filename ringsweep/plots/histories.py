@@ -248,8 +248,8 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain: bool
         _mark_separation(axes, ds, names)
     look.legend_above(axes)
     axes.set_ylabel(_short_label(ds, first))
-    if first.startswith("gap"):
-        label_axis(axes.yaxis, _SHORT_NAMES[first], unit_text(ds[first]))
+    if (unit := unit_text(ds[first])) == "m":
+        label_axis(axes.yaxis, _SHORT_NAMES.get(first, long_name(ds[first])), unit)
     axes.margins(x=0)
     if first == "impact_speed" or time_limits(ds)[1] > time[-1]:
         axes.set_xlim(*time_limits(ds))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
 
 import xarray as xr
 from matplotlib.axis import Axis
@@ -14,8 +13,8 @@ from ringsweep.errors import InputError
 from ringsweep.plots import look
 from ringsweep.plots.datasets import is_numeric, resolve
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.units import NUMBER, quantity
-from ringsweep.quantities.variables import configuration_of, swept, written
+from ringsweep.quantities.units import quantity
+from ringsweep.quantities.variables import configuration_of, swept, written_unit
 
 MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
@@ -81,7 +80,7 @@ def in_units(ds: xr.Dataset, units: Mapping[str, str] | None = None) -> xr.Datas
     if "configuration" in ds.attrs:
         source = configuration_of(ds)
         for coordinate in swept(ds):
-            unit = _written_unit(source, str(coordinate.attrs["path"]))
+            unit = written_unit(source, str(coordinate.attrs["path"]))
             if unit and is_numeric(coordinate) and coordinate.attrs.get("units") != "rad":
                 # The user may have changed the unit of the coordinate since.
                 with suppress(InputError):
@@ -99,26 +98,6 @@ def _show_in(ds: xr.Dataset, name: str, unit: str) -> None:
     one = quantity(f"1 {unit}", Parameter(si, f"unit of {name}"), f"units.{name}")
     if one != 1.0 or si == "rad":
         ds[name].attrs |= {"display_units": unit, "display_factor": 1.0 / one}
-
-
-def _written_unit(source: Mapping[str, Any], path: str) -> str:
-    """The unit in which a configuration wrote an axis, or else the value in the scene; empty if it wrote plain numbers.
-
-    Different units along one axis count as none.
-    """
-    sweep = source.get("sweep") or {}
-    in_sweep = [found for key in ("grid", "points") if (found := _texts((sweep.get(key) or {}).get(path)))]
-    texts = in_sweep[0] if in_sweep else _texts(written(source, path))
-    units = {text[match.end() :].strip() for text in texts if (match := NUMBER.match(text))}
-    return units.pop() if len(units) == 1 else ""
-
-
-def _texts(value: Any) -> list[str]:
-    """All texts in a value of a configuration."""
-    if isinstance(value, str):
-        return [value.strip()]
-    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
-    return [text for part in parts for text in _texts(part)]
 
 
 def display_factor(data: xr.DataArray) -> float:

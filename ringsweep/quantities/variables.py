@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,9 @@ import numpy as np
 
 from ringsweep.errors import InputError
 from ringsweep.quantities.flags import AFTERMATHS, JAMMED, LONG_RUNS, REGIMES, SEPARATING
+from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.quantity import Quantity
+from ringsweep.quantities.units import NUMBER, quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -394,3 +396,41 @@ def written(configuration: Mapping[str, Any], path: str) -> Any:
     for key in path.split("."):
         node = node.get(key) if isinstance(node, Mapping) else None
     return node
+
+
+def written_unit(configuration: Mapping[str, Any], path: str) -> str:
+    """The unit in which a configuration wrote an axis, or else the value in the scene; empty if it wrote plain numbers.
+
+    Different units along one axis count as none.
+    """
+    sweep = configuration.get("sweep") or {}
+    in_sweep = [found for key in ("grid", "points") if (found := _texts((sweep.get(key) or {}).get(path)))]
+    return common_unit(in_sweep[0] if in_sweep else _texts(written(configuration, path)))
+
+
+def common_unit(texts: Iterable[str]) -> str:
+    """The unit that follows the number in all texts; empty if it is not one."""
+    units = {text[match.end() :].strip() for text in texts if (match := NUMBER.match(text))}
+    return units.pop() if len(units) == 1 else ""
+
+
+def _texts(value: Any) -> list[str]:
+    """All texts in a value of a configuration."""
+    if isinstance(value, str):
+        return [value.strip()]
+    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+    return [text for part in parts for text in _texts(part)]
+
+
+def in_unit(data: xr.DataArray, unit: str) -> xr.DataArray:
+    """Numbers in another unit than SI; as they are if it is empty.
+
+    Raises
+    ------
+    InputError
+        If the unit does not fit.
+    """
+    if not unit:
+        return data
+    si = Parameter(str(data.attrs.get("units", "1")), str(data.attrs.get("long_name", data.name)))
+    return (data / quantity(f"1 {unit}", si, "unit")).assign_attrs(data.attrs | {"units": unit})

@@ -17,8 +17,8 @@ from ringsweep.config.axes import Axes, dimension, sweep_section, swept_paramete
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
-from ringsweep.quantities.units import quantity, show
-from ringsweep.quantities.variables import QUANTILE_ENDS, words
+from ringsweep.quantities.units import quantity, show, spelled
+from ringsweep.quantities.variables import QUANTILE_ENDS, common_unit, in_unit, words, written_unit
 from ringsweep.runs.boundaries import bisect, located, run_points, word_in
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.regime_words import check_word
@@ -119,6 +119,7 @@ def locate(
     scan: int | None = None,
     settings: Iterable[str] = (),
     jobs: int | None = None,
+    unit: str | None = None,
 ) -> xr.Dataset:
     """Thresholds of a configuration in which some values are changed; see :func:`threshold`.
 
@@ -128,15 +129,23 @@ def locate(
         An end that is None is that of the sweep.
     settings : iterable of str
         As for :func:`ringsweep.config.with_values`.
+    unit : str, optional
+        Unit of the answer in words; by default that of the ends, or else that of the number in the configuration.
     """
     settings = list(settings)
     whole = load(config, _beside_axes(config, path, settings))
     path = as_named(path, whole.scene.structure.elsewhere)
     sampled = () if whole.sample is None else (one for factor in whole.sample.factors for one in factor.paths)
     check_word(regime, whole.scene, {path, *whole.axes.columns, *sampled})
+    ends = interval(whole, path, between)
+    if unit is None:
+        given = (str(spelled(end)) for end in (() if between is None else between) if end is not None)
+        unit = common_unit(given) or written_unit(whole.source, path)
+    else:
+        quantity(f"1 {unit}", Parameter(sweepable(whole.scene)[path].attributes["units"], path), "unit")
     if whole.sample is not None:
-        low, high = interval(whole, path, between)
-        return distribution(whole, path, regime, *_scan(whole, path, (low, high), tolerance, scan), jobs=jobs)
+        found = distribution(whole, path, regime, *_scan(whole, path, ends, tolerance, scan), jobs=jobs)
+        return found.assign_attrs(threshold_unit=unit)
     one, low, high = _single_run(config, path, between, settings)
     values, allowed = _scan(one, path, (low, high), tolerance, scan)
     scanned = load(dict(one.source) | {"sweep": {"grid": {path: values.tolist()}}})
@@ -151,7 +160,7 @@ def locate(
     return (
         found.drop_vars(["line", "axis"])
         .assign(begins=("vertex", begins, {"long_name": "whether the regime begins as the number grows"} | flags))
-        .assign_attrs(threshold_path=path, scan=_scanned(runs, name, label))
+        .assign_attrs(threshold_path=path, threshold_unit=unit, scan=_scanned(runs, in_unit(runs[name], unit), label))
     )
 
 
@@ -311,9 +320,9 @@ def _single_run(config: Any, path: str, between: Any, settings: list[str]) -> tu
     return one, low, high
 
 
-def _scanned(runs: xr.Dataset, name: str, label: str) -> str:
+def _scanned(runs: xr.Dataset, axis: xr.DataArray, label: str) -> str:
     """What a scan found, in words."""
-    axis, regimes = runs[name], words(runs[label]).values
+    regimes = words(runs[label]).values
     seen = ", ".join(f"{count} {regime}" for regime, count in zip(*np.unique(regimes, return_counts=True), strict=True))
     text = f"{len(regimes)} runs from {_number(axis[0].item(), axis)} to {_number(axis[-1].item(), axis)}: {seen}"
     unsure = int((runs["certified"] != 1).sum())
@@ -343,10 +352,12 @@ def in_words(found: xr.Dataset) -> str:
         return "\n".join(
             [f"{regime} begins at {path}, by its probability (95 % interval):", *_quantiles_in_words(found)]
         )
-    axis = found[dimension(path)]
+    axis, unit = found[dimension(path)], found.attrs.get("threshold_unit", "")
+    allowed = in_unit(found["error"].assign_attrs(units=axis.attrs.get("units", "1")), unit)
+    axis = in_unit(axis, unit)
     lines = []
     for value, error, begins, beyond in zip(
-        axis.values, found["error"].values, found["begins"].values, words(found["beyond"]).values, strict=True
+        axis.values, allowed.values, found["begins"].values, words(found["beyond"]).values, strict=True
     ):
         does, side = ("begins", "below") if begins else ("ends", "above")
         at = f"{path} = {_with_error(value, error)}{_unit(axis)}"
@@ -359,12 +370,14 @@ def in_words(found: xr.Dataset) -> str:
 
 
 def _quantiles_in_words(found: xr.Dataset) -> list[str]:
-    unit = found["threshold"].attrs.get("units", "1")
+    unit = found.attrs.get("threshold_unit", "") or found["threshold"].attrs.get("units", "1")
     lines = []
     for level in found["quantile"].values:
         one = found.sel(quantile=level)
-        value, low, high = (one[f"threshold_quantile{end}"].item() for end in ("", "_low", "_high"))
-        shown = f"{value:.6g}{_unit(found['threshold'])} ({low:.6g} to {high:.6g})"
+        ends = (one[f"threshold_quantile{end}"] for end in ("", "_low", "_high"))
+        si = found["threshold"].attrs.get("units", "1")
+        value, low, high = (in_unit(end.assign_attrs(units=si), unit).item() for end in ends)
+        shown = f"{value:.6g}{after_number(unit)} ({low:.6g} to {high:.6g})"
         if unit == "rad":
             shown += f", {degrees(value):.6g} deg ({degrees(low):.6g} to {degrees(high):.6g})"
         lines.append(f"  {level:.0%} below {shown}")
