@@ -480,6 +480,20 @@ def test_an_unknown_key_lists_the_keys_of_the_law_that_is_given_only(changes, pa
     assert (error.path, error.problem) == (f"scene.{path}", f"unknown key{hint}")
 
 
+@pytest.mark.parametrize(
+    "config",
+    [
+        {"scene": SCENE | {"model": "my-disc"}},
+        {"scene": SCENE | {"friction": {"law": "weakening", "v1": 1}}},
+        {"scene": SCENE | {"drive": {"law": "my-run-up"}}},
+        {"scene": SCENE, "solver": "heun"},
+        {"scene": SCENE, "sweep": {"grid": {"friction.law": ["coulomb", "weakening"]}}},
+    ],
+)
+def test_an_unknown_name_is_told_where_files_of_ones_own_are_named(config):
+    assert "no file that the environment variable RINGSWEEP_LAWS names defines it" in refusal(load, config).problem
+
+
 def test_a_number_under_mu_is_no_formula_where_another_law_is_named():
     error = refusal(read_scene, SCENE | {"friction": {"law": "stiction", "mu": 0.3}})
     assert (error.path, error.problem[:8]) == ("scene.friction.elsewhere.mu_s", "missing:")

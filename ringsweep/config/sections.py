@@ -85,9 +85,15 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
     if not given:
         raise InputError(where, "empty: give at least one value")
     if isinstance(parameter, Choice):
-        problem = f"is not a {parameter.long_name}"
-        return np.array([one_of(name, parameter.names, f"{where}.{i}", problem) for i, name in enumerate(given)])
+        names = parameter.names
+        return np.array([_registered(name, names, f"{where}.{i}", parameter.long_name) for i, name in enumerate(given)])
     return np.array([quantity(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
+
+
+def _registered(given: object, known: Iterable[str], path: str, what: str) -> str:
+    """The name of a part of the package, or of one that a user's own file defines."""
+    own = ", and no file that the environment variable RINGSWEEP_LAWS names defines it"
+    return one_of(given, known, path, f"is not a {what}" + (own if nearest_name(given, known) is None else ""))
 
 
 def section_of(parent: dict[str, Any], key: str, prefix: str) -> dict[str, Any]:
@@ -104,4 +110,4 @@ def choose(registry: Mapping[str, Any], section: dict[str, Any], path: str, what
     key = path.rpartition(".")[2]
     if key not in section:
         raise InputError(path, f"missing: name a {what}: {', '.join(registry)}")
-    return one_of(section[key], registry, path, f"is not a {what}")
+    return _registered(section[key], registry, path, what)
