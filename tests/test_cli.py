@@ -550,7 +550,7 @@ def test_documentation_names_every_key_law_drive_and_variable():
         path
         for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",)))
         for law in MODELS[model].laws
-        for path in parameters(Structure(model, law, drive, arcs))
+        for path in parameters(Structure(model, law, drive, arcs, elsewhere="elsewhere"))
     }
     for name in {*keys, *MODELS, *LAWS, *DRIVES, *METHODS, *OUTCOMES, *HISTORY} - {"auto"}:
         assert re.search(rf"`[^`]*\b{re.escape(name)}`", text), name
