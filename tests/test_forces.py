@@ -422,7 +422,8 @@ class TestAudit:
         for late in (0.0, 0.01):
             c = np.zeros((series.table_shape(scene)[0], COLUMNS))
             with np.errstate(divide="ignore"):
-                h = 0.5 * series.expand(scene, mode, 0.2 + late, y, 1e-10, c)
+                longest, _ = series.expand(scene, mode, 0.2 + late, y, 1e-10, c)
+            h = 0.5 * longest
             step = Step(mode, False, 0.2, h, y, series.state_at(scene, c, h))
             scratch = scratch_for(1, 2, 0)._replace(c=c)
             found = audit_step(SetValued(), scene, step, scratch, 1e-10, Audit(0.0, 0.0, 0.0))
