@@ -418,8 +418,10 @@ def _extremes(scene, record, start, scratch, taken, views, count):
         # The parabola through the three values is monotonic if their difference is twice as large as its bend.
         turns = abs(c - a) < 4.0 * bend
         beyond = max(a, max(b, c)) + 0.5 * bend > greatest or min(a, min(b, c)) - 0.5 * bend < least
-        # A velocity counts beside its records: between two turns a body may reverse.
-        found = found or (turns and (beyond or q == 1))
+        found = found or (turns and beyond)
+    # Velocities count beside their records: between two turns of the velocity a body may reverse.
+    before, within, after = views[0][1][2], views[1][1][2], views[2][1][2]
+    found = found or before * within < 0.0 or within * after < 0.0
     return _turns(scene, record, start, scratch, taken, views, count) if found else count
 
 
