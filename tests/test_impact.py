@@ -18,6 +18,7 @@ from benchmarks.hostile.attack import same_bits
 from benchmarks.hostile.kills import killed_at
 from ringsweep import cli
 from ringsweep.errors import InputError
+from ringsweep.models.ring.impact.switch import SUMMED
 from ringsweep.physics.impact import Balls, Motion, contact_of, impulses
 from ringsweep.quantities.flags import AFTERMATHS, SEPARATING
 from ringsweep.quantities.variables import INFERRED, LABELS
@@ -108,6 +109,17 @@ class TestParticle:
         np.testing.assert_allclose(run.impact_speed, lands_at * e**k, rtol=1e-12)
         assert run.t_recovered.item() == pytest.approx(ends, rel=1e-12)
         assert run.impact_loss.item() == pytest.approx(PARTICLE["body"]["mass"] * G * 2 * RADIUS, rel=1e-12)
+
+    def test_number_of_impacts_that_rounding_decides_has_no_certificate(self):
+        """After k impacts the particle of the test above hops 16 R e^2k/(1 - e)^2 high at most: here the threshold."""
+        k, low, high = 20, 0.3, 0.9
+        for _ in range(100):
+            e = 0.5 * (low + high)
+            low, high = (e, high) if 16.0 * e ** (2 * k) / (1.0 - e) ** 2 < SUMMED else (low, e)
+        above = PARTICLE | {"initial": {"phi": pi, "omega": 0.0}, "impact": {"restitution": e}, "time": {"span": 5.0}}
+        found = ringsweep.sweep(above, {"impact.restitution": [e * (1.0 - 1e-4), e, e * (1.0 + 1e-4)]})
+        assert found.certified.values.tolist() == [1, 0, 1]
+        assert np.ptp(found.impacts.values) == 1
 
 
 # A narrow body that rocks from one contact to the other until it rests.
