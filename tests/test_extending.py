@@ -155,7 +155,7 @@ CLAIMS = {
     """,
     "the scene of the page is a scene of the disc": f"""
         from ringsweep.config.configuration import read_scene
-        assert read_scene({ON_DISC["scene"]}, None, None).structure.model == "disc"
+        assert read_scene({ON_DISC["scene"]}).structure.model == "disc"
     """,
     "a brake without servo action moves as one contact, and servo action opens a shoe": """
         friction = {"law": "weakening", "rest": {"mu_s": 0.4, "mu_k": 0.3}, "v1": 1.0}

@@ -448,7 +448,7 @@ def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatc
     grid = {"belt.velocity": {"linspace": [0.08, 0.12, 4]}, "time.span": {"linspace": [6.0, 9.0, 4]}}
     write(tmp_path / "my.yaml", config(grid=grid, n=64, sensitivity=True, survival=[2.0, 6.0, 7.0]))
     assert main(["run", "my.yaml", "--dry-run", "--jobs", "1"]) == 0
-    assert "192 runs in each, 3072 in all" in capsys.readouterr().out
+    assert "cells: 16 (belt_velocity 4, time_span 4); 192 runs in each" in capsys.readouterr().out
     assert main(["run", "my.yaml", "--jobs", "1"]) == 0
     assert "riding: 0.00% to 100.00%" in capsys.readouterr().out
     write(tmp_path / "one.yaml", config(n=64, sensitivity=True))

@@ -152,7 +152,8 @@ def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
     drive alone decides its motion.
     """
     ends = [column for column, name in enumerate(with_errors(runs.outcomes)) if name.endswith("_end")]
-    stuck = runs.column("stick_time") == runs.column("t_end")
+    # The time for which it sticks is a sum, which is rounded.
+    stuck = np.isclose(runs.column("stick_time"), runs.column("t_end"), rtol=1e-12, atol=0.0)
     difference, scale = _differences(runs)
     with np.errstate(invalid="ignore"):
         same = (difference <= _SAME * scale)[:, ends].all(axis=1)
