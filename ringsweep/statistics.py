@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv, stdtrit
 
 Floats = NDArray[np.float64]
 
@@ -120,6 +119,9 @@ def clopper_pearson(hits: Any, runs: Any) -> tuple[Floats, Floats]:
     hits, runs = np.broadcast_arrays(np.asarray(hits, dtype=float), np.asarray(runs, dtype=float))
     tail = 0.5 * (1.0 - CONFIDENCE)
     missed = np.maximum(runs - hits, 0.0)
+    # SciPy is slow to import, and every command reads this module.
+    from scipy.special import betaincinv
+
     low = np.where(hits > 0.0, betaincinv(np.maximum(hits, 1e-300), missed + 1.0, tail), 0.0)
     high = np.where(missed > 0.0, betaincinv(hits + 1.0, np.maximum(missed, 1e-300), 1.0 - tail), 1.0)
     return low, high
@@ -157,6 +159,8 @@ def share_interval(hits: NDArray[Any], size: int, independent: bool) -> tuple[Fl
 
 
 def _student(freedom: float) -> float:
+    from scipy.special import stdtrit
+
     return float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE))
 
 
