@@ -289,11 +289,14 @@ def _shade(axes: Axes, time: NDArray[Any], phases: NDArray[Any], explain: bool) 
     edges, phase = _by_interval(time, phases)
     stick = look.on_page(look.STICK)
     shades = ((0, stick, 1.0), (datasets.PIVOT, look.OPEN, 0.18), (datasets.FLIGHT, look.OPEN, 0.45))
+    limits = axes.dataLim.frozen()
     for value, colour, alpha in shades:
         spans = [(edges[i], edges[j] - edges[i]) for i, j in look.true_ranges(phase == value)]
         style: dict[str, Any] = {"color": colour, "alpha": alpha}
         style["label"] = datasets.mode_name(value) if explain and spans else None
         axes.broken_barh(spans, (0, 1), transform=axes.get_xaxis_transform(), linewidth=0, **style)
+    # Before version 3.11 matplotlib takes the share of the height for data.
+    axes.dataLim.set(limits)
 
 
 def _draw_impacts(axes: Axes, ds: xr.Dataset) -> None:
