@@ -387,6 +387,10 @@ def test_hatching_of_a_large_map_is_one_patch_for_each_colour(tmp_path, monkeypa
     plots.save(figure, tmp_path / "map.png")
 
 
+def test_notebook_shows_a_picture_without_the_inline_magic():
+    assert plots.history(make_history())._repr_png_().startswith(b"\x89PNG")
+
+
 def test_axes_are_saved_with_their_figure(tmp_path):
     figure = plots.regime_map(make_sweep())
     for name, what in (("figure.png", figure), ("axes.png", figure.axes[0])):

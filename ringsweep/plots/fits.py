@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
 from ringsweep.plots.labels import displayed, long_name, unit_text
-from ringsweep.plots.look import PAIR_COLOURS, SMALL, figure_width, legend_above, on_page, small_ticks
+from ringsweep.plots.look import PAIR_COLOURS, SMALL, Picture, figure_width, legend_above, on_page, small_ticks
 
 
 def fit(ds: xr.Dataset) -> Figure:
@@ -41,7 +41,7 @@ def fit(ds: xr.Dataset) -> Figure:
     """
     if not {"measured", "fitted"} <= set(ds):
         raise InputError("ds", "is no fit: ringsweep fit makes one")
-    figure = Figure(figsize=(figure_width(), 0.7 * figure_width()), layout="constrained")
+    figure = Picture(figsize=(figure_width(), 0.7 * figure_width()), layout="constrained")
     data, rest = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     one, two = (on_page(colour) for colour in PAIR_COLOURS)
     time, unit = ds["t"].values, unit_text(ds["measured"])

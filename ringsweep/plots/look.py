@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import re
 import textwrap
@@ -12,6 +13,7 @@ import numpy as np
 from matplotlib import colors, transforms
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotParams
 from matplotlib.legend import Legend
 from numpy.typing import NDArray
@@ -194,6 +196,15 @@ def arcs(count: int) -> list[tuple[str, str]]:
     """Name and colour of each of `count` zones, the same in every picture."""
     colours = CLASS_COLOURS[2:]
     return [("zone" if count == 1 else f"zone {k + 1}", colours[k % len(colours)]) for k in range(count)]
+
+
+class Picture(Figure):
+    """A figure that a notebook shows as a picture, also before ``%matplotlib inline``."""
+
+    def _repr_png_(self) -> bytes:
+        written = io.BytesIO()
+        self.savefig(written, format="png")
+        return written.getvalue()
 
 
 def axes_or_current(ax: Axes | None, height: float) -> Axes:

@@ -20,6 +20,7 @@ from ringsweep.plots.look import (
     CURVE_STYLES,
     GRID,
     SMALL,
+    Picture,
     axes_or_current,
     figure_width,
     folded,
@@ -70,7 +71,7 @@ def work_precision(ds: xr.Dataset, error: str = "error_end") -> Figure:
     ringsweep.errors.InputError: ds: has no contender, cell, time_per_run, method: it is not error against run time
     """
     width = figure_width()
-    figure = Figure(figsize=(width, (1.15 if is_narrow(width) else 0.63) * width), layout="constrained")
+    figure = Picture(figsize=(width, (1.15 if is_narrow(width) else 0.63) * width), layout="constrained")
     precision_panel(ds, error, figure.add_subplot())
     return figure
 
