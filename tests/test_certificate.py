@@ -257,16 +257,16 @@ class TestErrors:
         assert (found.errors[:, with_errors(NAMES).index("t_separation")] >= error).all()
 
     @pytest.mark.parametrize(
-        ("method", "law", "drive", "median"),
+        ("method", "law", "drive", "median", "median_of_all"),
         [
-            (Event(), "stiction", "arctan", 400),
+            (Event(), "stiction", "arctan", 150, 400),
             # Most steps end at events, so that a run at a looser tolerance takes the same steps.
-            (Event(rtol=1e-5), "stiction", "arctan", 300),
-            (Implicit(), "bengisu-akay", "arctan", 400),
-            (Implicit(), "bengisu-akay", "power", 850),
+            (Event(rtol=1e-5), "stiction", "arctan", 100, 300),
+            (Implicit(), "bengisu-akay", "arctan", 300, 400),
+            (Implicit(), "bengisu-akay", "power", 700, 850),
         ],
     )
-    def test_error_bounds_cover_the_true_errors(self, cells, method, law, drive, median):
+    def test_error_bounds_cover_the_true_errors(self, cells, method, law, drive, median, median_of_all):
         rng = np.random.default_rng(8)
         count = 400
         values = {
@@ -286,15 +286,19 @@ class TestErrors:
         batch = cells(values, law=law, drive=drive)
         found = method.run(batch, NAMES)
         exact = solve(Event(rtol=1e-14) if law == "stiction" else Implicit(rtol=3e-10), batch)
-        covered, ratios = [], []
+        covered, ratios, of_motion = [], [], []
         for k, name in enumerate(with_errors(NAMES)):
             error = np.abs(found.rows[:, NAMES.index(name)] - getattr(exact, name))
             stated = found.errors[:, k]
             known = np.isfinite(error) & np.isfinite(stated) & (found.rows[:, 0] == exact.regime)
             covered.append((stated >= error)[known])
             ratios.append((stated / np.where(error > 0.0, error, np.nan))[known])
+            # Most reactions and jumps are exact to rounding; their bounds are those of the few that are not.
+            if not name.startswith(("normal", "jump")):
+                of_motion.append(ratios[-1])
         assert np.concatenate(covered).mean() > 0.99
-        assert np.nanmedian(np.concatenate(ratios)) < median
+        assert np.nanmedian(np.concatenate(of_motion)) < median
+        assert np.nanmedian(np.concatenate(ratios)) < median_of_all
 
     @pytest.mark.slow
     def test_difference_that_is_small_by_chance_does_not_make_the_bound_small(self):
