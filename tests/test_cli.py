@@ -155,6 +155,10 @@ def test_single_run_asks_for_a_value_that_only_the_sweep_gives(folder, capsys):
     assert "--set drive.amplitude=VALUE" in refused(capsys, "simulate", "case.yaml")
 
 
+def test_mistaken_option_names_no_line_of_the_file(folder, capsys):
+    assert "line" not in refused(capsys, "simulate", "case.yaml", "--set", "drive.amplitude")
+
+
 @pytest.mark.parametrize("verb", ["map", "plot", "info"])
 def test_missing_result_file_is_refused(folder, capsys, verb):
     assert "nowhere.nc" in refused(capsys, verb, "nowhere.nc")

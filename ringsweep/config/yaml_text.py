@@ -69,7 +69,8 @@ class Document:
         try:
             yield
         except InputError as error:
-            if error.file is None:
+            # No line of the file is at fault for an option of a command.
+            if error.file is None and not error.path.startswith("--"):
                 path = error.path
                 while path not in self.locations and path:
                     path = path.rpartition(".")[0]
