@@ -116,10 +116,19 @@ class TestParticle:
         for _ in range(100):
             e = 0.5 * (low + high)
             low, high = (e, high) if 16.0 * e ** (2 * k) / (1.0 - e) ** 2 < SUMMED else (low, e)
-        above = PARTICLE | {"initial": {"phi": pi, "omega": 0.0}, "impact": {"restitution": e}, "time": {"span": 5.0}}
-        found = ringsweep.sweep(above, {"impact.restitution": [e * (1.0 - 1e-4), e, e * (1.0 + 1e-4)]})
-        assert found.certified.values.tolist() == [1, 0, 1]
-        assert np.ptp(found.impacts.values) == 1
+        above = PARTICLE | {"initial": {"phi": pi, "omega": 0.0}, "time": {"span": 5.0}}
+        low, high = e * (1.0 - 1e-4), e * (1.0 + 1e-4)
+        # Rounding moves the value of e at which the number changes, and differs between processors: search for it.
+        tried = np.linspace(e * (1.0 - 1e-4), e * (1.0 + 1e-4), 33)
+        first = ringsweep.sweep(above, {"impact.restitution": tried}, progress=False)
+        assert first.certified.values[[0, -1]].tolist() == [1, 1]
+        fewer = first.impacts.values[0]
+        assert first.impacts.values[-1] == fewer + 1
+        while len(tried) > 2:
+            found = ringsweep.sweep(above, {"impact.restitution": tried}, progress=False)
+            more = int(np.argmax(found.impacts.values > fewer))
+            tried = np.unique(np.linspace(tried[more - 1], tried[more], 33))
+        assert ringsweep.sweep(above, {"impact.restitution": tried}, progress=False).certified.values.tolist() != [1, 1]
 
 
 # A narrow body that rocks from one contact to the other until it rests.
