@@ -358,9 +358,3 @@ class TestCommands:
         assert "did you mean stiction?" in capsys.readouterr().err
         assert main(["plot", "laws-run.nc", "--kind", "friction"]) == 2
         assert "holds a run under each of coulomb, stiction, tustin: choose one" in capsys.readouterr().err
-
-    def test_wrong_number_of_threads_is_refused_with_a_readable_message(self, capsys):
-        for jobs in ("two", "0", "-1", "1.5"):
-            with pytest.raises(SystemExit):
-                main(["run", "laws.yaml", f"--jobs={jobs}"])
-            assert f"'{jobs}' is not a whole number of at least 1" in capsys.readouterr().err

@@ -20,7 +20,12 @@ logger = logging.getLogger("ringsweep")
 
 
 def init_command(arguments: argparse.Namespace) -> None:
-    """Write a configuration from a template."""
+    """Write a first configuration, to be edited.
+
+    ringsweep init                     my-sweep.yaml: two balls in a ring
+    ringsweep init --model belt belt.yaml
+    ringsweep init --model ring-single-contact
+    """
     from importlib.resources import files
 
     from ringsweep.storage.files import check_writable, replacing
@@ -41,7 +46,17 @@ def init_command(arguments: argparse.Namespace) -> None:
 
 
 def run_command(arguments: argparse.Namespace) -> int:
-    """Run a sweep into a file, print a summary and draw the regime map."""
+    """Run a sweep: NetCDF, and a regime map beside it.
+
+    ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
+    ringsweep run my.yaml --dry-run    cells, memory, disk, time; writes nothing
+    ringsweep run my.yaml --jobs 1 -o results/one.nc
+    ringsweep run my.yaml --set time.span=20 -o longer.nc
+    ringsweep run finer.yaml --reuse my.nc
+    ringsweep run my.yaml --refine     compute only the boundaries of the map
+    ringsweep run my.nc -o again.nc    repeat the sweep of my.nc
+    ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
+    """
     from ringsweep.config import load, with_refine
     from ringsweep.runs.plans import plan_of
 
@@ -119,21 +134,41 @@ def _store(result: Any, target: Path, picture: Path, text: str, draw: str) -> No
 
 
 def map_command(arguments: argparse.Namespace) -> None:
-    """Draw a variable of a sweep."""
+    """Draw a variable of a sweep.
+
+    ringsweep map my.nc                my.png: the regimes
+    ringsweep map my.nc --var t_separation --x zone.half_angle
+    ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
+    ringsweep map my.nc -o my.html     a page for the browser: zoom, numbers of each cell, all variables
+    ringsweep map my.nc --var origin   which cells of a refined sweep were run
+    ringsweep map my.nc --boundaries separating --tolerance 1e-6
+    """
     from ringsweep.cli import drawing
 
     drawing.draw_stored(arguments, drawing.draw_map)
 
 
 def plot_command(arguments: argparse.Namespace) -> None:
-    """Draw a stored run, or stored errors against run time."""
+    """Draw a stored run, or stored errors against run time.
+
+    ringsweep plot my-run.nc           my-run.png: the time history
+    ringsweep plot my-run.nc --from 3 --to 4 -o end.png
+    ringsweep plot my-run.nc --kind phase -o portrait.pdf
+    ringsweep plot my-run.nc --kind friction --law lugre
+    ringsweep plot uncertain.nc --kind sensitivity --word separating --sel drive.amplitude=2
+    """
     from ringsweep.cli import drawing
 
     drawing.draw_stored(arguments, drawing.draw_plot)
 
 
 def simulate_command(arguments: argparse.Namespace) -> int:
-    """Run once, write the history and draw it."""
+    """Run once, or under each law of a sweep: history and its picture.
+
+    ringsweep simulate my.yaml         my-run.nc and my-run.png
+    ringsweep simulate my.yaml --set drive.amplitude=4 --set "zone.half_angle=20 deg"
+    ringsweep simulate my.nc --set drive.amplitude=4     the scene of my.nc, with this amplitude
+    """
     from ringsweep.config import with_values
 
     config = with_values(arguments.config, arguments.set)
@@ -151,7 +186,12 @@ def simulate_command(arguments: argparse.Namespace) -> int:
 
 
 def threshold_command(arguments: argparse.Namespace) -> None:
-    """Print the values at which a regime begins or ends."""
+    """The value of a number at which a regime begins or ends.
+
+    ringsweep threshold my.yaml --path drive.amplitude --regime separating
+    ringsweep threshold my.yaml --path zone.half_angle --regime jammed --from "2 deg" --to "60 deg"
+    ringsweep threshold my.yaml --path friction.rough.mu_k --regime separating --from 0.1 --to 0.5 --tolerance 1e-9
+    """
     from ringsweep.runs.thresholds import in_words, locate
 
     asked = arguments.config, arguments.path, arguments.regime, (arguments.low, arguments.high), arguments.tolerance
@@ -160,7 +200,12 @@ def threshold_command(arguments: argparse.Namespace) -> None:
 
 
 def fit_command(arguments: argparse.Namespace) -> None:
-    """Fit numbers of a scene to a measured history, write and draw the fit."""
+    """Fit parameters of a scene to a measured time history.
+
+    ringsweep fit my.yaml --data run.csv --vary friction.rough.mu_k,zone.half_angle
+    ringsweep fit my.yaml --data run.csv --vary "friction.rough.mu_k=0.1..0.6" --noise "0.5 deg"
+    The first line of run.csv names the columns: t (s), and phi (deg) or x (mm).
+    """
     from ringsweep.config import load
     from ringsweep.runs.fit import dataset, fitted
 
@@ -186,7 +231,12 @@ def _other_scene(target: Path, result: Any) -> str:
 
 
 def animate_command(arguments: argparse.Namespace) -> int:
-    """Run once and write an animation."""
+    """Run once: film of the body.
+
+    ringsweep animate my.yaml          my-run.gif
+    ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
+    ringsweep animate my.nc -o run.html  a page with buttons, for the scene of my.nc
+    """
     from ringsweep.config import with_values
     from ringsweep.models import MODELS
 
@@ -213,7 +263,11 @@ def animate_command(arguments: argparse.Namespace) -> int:
 
 
 def precision_command(arguments: argparse.Namespace) -> None:
-    """Measure error against run time, print a table and draw it."""
+    """Measure error against run time, and recommend a solver.
+
+    ringsweep precision my.yaml
+    ringsweep precision my.yaml --target 1e-9 --cells 64
+    """
     from ringsweep.config import load
 
     name = arguments.output or f"{load(arguments.config).name}-precision.nc"
@@ -228,7 +282,10 @@ def precision_command(arguments: argparse.Namespace) -> None:
 
 
 def info_command(arguments: argparse.Namespace) -> None:
-    """Print a summary of a result file."""
+    """Print a summary of a result file.
+
+    ringsweep info my.nc
+    """
     from ringsweep.storage import netcdf
 
     sealed = netcdf.check(arguments.dataset)
@@ -241,7 +298,11 @@ def info_command(arguments: argparse.Namespace) -> None:
 
 
 def verify_command(arguments: argparse.Namespace) -> int:
-    """Print whether files are what was written."""
+    """Check that files are what ringsweep wrote.
+
+    ringsweep verify my.nc             exit status 0, or 2 if it is damaged, was changed, or has no seal
+    ringsweep verify results/*.nc
+    """
     from ringsweep.storage import netcdf
 
     status = 0
@@ -293,7 +354,12 @@ def _print_summary(name: str, result: Any) -> None:
 
 
 def schema_command(arguments: argparse.Namespace) -> None:
-    """Print the JSON schema of the configuration."""
+    """Print the JSON schema of the configuration, for editors.
+
+    ringsweep schema > schema.json
+    Editors with the YAML language server then check files whose first line is
+        # yaml-language-server: $schema=schema.json
+    """
     import json
 
     from ringsweep.config.schema import schema

@@ -3,27 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import math
 import re
 import shutil
-from contextlib import suppress
+from collections.abc import Callable
 from textwrap import dedent, indent
 from typing import Any, NoReturn
 
-from ringsweep.cli.commands import (
-    animate_command,
-    fit_command,
-    info_command,
-    init_command,
-    map_command,
-    plot_command,
-    precision_command,
-    run_command,
-    schema_command,
-    simulate_command,
-    threshold_command,
-    verify_command,
-)
+from ringsweep.cli import commands
 from ringsweep.errors import InputError, nearest_name, shortened
 
 
@@ -40,31 +26,19 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
     _add_verbosity(parser)
     parser.set_defaults(quiet=False, verbose=False)
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    entries = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    init = _add_command(commands, "init", init_command, "write a first configuration, to be edited", """
-        ringsweep init                     my-sweep.yaml: two balls in a ring
-        ringsweep init --model belt belt.yaml
-        ringsweep init --model ring-single-contact
-        """)  # fmt: skip
-    init.add_argument("config", nargs="?", default="my-sweep.yaml", metavar="NEW.yaml", help="default: my-sweep.yaml")
+    first = "my-sweep.yaml"
+    init = _add_command(
+        entries, commands.init_command, "config NEW.yaml", f"default: {first}", nargs="?", default=first
+    )
     models = ["ring", "ring-single-contact", "belt"]
     _option(init, "--model", "what it describes (default: ring)", choices=models, default="ring")
 
-    run = _add_command(commands, "run", run_command, "run a sweep: NetCDF, and a regime map beside it", """
-        ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
-        ringsweep run my.yaml --dry-run    cells, memory, disk, time; writes nothing
-        ringsweep run my.yaml --jobs 1 -o results/one.nc
-        ringsweep run my.yaml --set time.span=20 -o longer.nc
-        ringsweep run finer.yaml --reuse my.nc
-        ringsweep run my.yaml --refine     compute only the boundaries of the map
-        ringsweep run my.nc -o again.nc    repeat the sweep of my.nc
-        ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
-        """)  # fmt: skip
-    run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
+    run = _add_command(entries, commands.run_command, "config CONFIG.yaml", "or OUT.nc, whose sweep is repeated")
     _option(run, "-o --output OUT.nc", "default: the configuration's name, in this folder")
     _option(run, *_SET, **_LIST)
-    _option(run, *_JOBS, type=whole_number)
+    _option(run, *_JOBS, type=_COUNT)
     _option(run, "--dry-run", "estimate memory, disk space and time; write nothing")
     _option(run, "--fresh", "start over: discard what an earlier run computed")
     _option(run, "--reuse OLD.nc", "take cells that this earlier sweep has too")
@@ -72,15 +46,7 @@ def build_parser() -> argparse.ArgumentParser:
     _option(run, "--backend", "what computes (default: threads of this machine)", choices=["threads", "dask"])
     _option(run, "--scheduler ADDRESS", "address of a Dask scheduler, such as tcp://host:8786")
 
-    draw = _add_command(commands, "map", map_command, "draw a variable of a sweep", """
-        ringsweep map my.nc                my.png: the regimes
-        ringsweep map my.nc --var t_separation --x zone.half_angle
-        ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
-        ringsweep map my.nc -o my.html     a page for the browser: zoom, numbers of each cell, all variables
-        ringsweep map my.nc --var origin   which cells of a refined sweep were run
-        ringsweep map my.nc --boundaries separating --tolerance 1e-6
-        """)  # fmt: skip
-    draw.add_argument("dataset", metavar="OUT.nc")
+    draw = _add_command(entries, commands.map_command, "dataset OUT.nc")
     _option(draw, "-o --output MAP.png", "default: beside OUT.nc; .pdf, .svg and .html too")
     _option(draw, "--x DIM", "coordinate across")
     _option(draw, "--y DIM", "coordinate up")
@@ -89,58 +55,33 @@ def build_parser() -> argparse.ArgumentParser:
     _option(draw, "--sel DIM=VALUE", held, **_LIST)
     _option(draw, "--log", "colours follow the logarithm of the numbers")
     _option(draw, "--boundaries REGIME", "locate the boundary of a regime: curves, also as NetCDF")
-    _option(draw, "--tolerance T", "error of these, in SI units (default: 1e-6)", type=positive_number)
+    _option(draw, "--tolerance T", "error of these, in SI units (default: 1e-6)", type=_POSITIVE)
 
-    threshold = _add_command(commands, "threshold", threshold_command,
-        "the value of a number at which a regime begins or ends", """
-        ringsweep threshold my.yaml --path drive.amplitude --regime separating
-        ringsweep threshold my.yaml --path zone.half_angle --regime jammed --from "2 deg" --to "60 deg"
-        ringsweep threshold my.yaml --path friction.rough.mu_k --regime separating --from 0.1 --to 0.5 --tolerance 1e-9
-        """)  # fmt: skip
-    threshold.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
+    threshold = _add_command(entries, commands.threshold_command, "config CONFIG.yaml", "or OUT.nc, whose scene is run")
     _option(threshold, "--path PATH", "the number that varies: drive.amplitude", required=True)
     _option(threshold, "--regime REGIME", "the regime: separating; with impact also: tumbled", required=True)
     _option(threshold, "--from VALUE", "where to look; default: as the sweep has it", dest="low")
     _option(threshold, "--to VALUE", "units allowed", dest="high")
     _option(threshold, "--tolerance T", "largest error (default: 1e-6 of the greatest value)")
     _option(threshold, "--unit U", "unit of the answer: rpm (default: as the ends or the file have it)")
-    _option(threshold, "--scan N", "runs in which changes of regime are looked for (default: 128)", type=whole_number)
-    _option(threshold, *_JOBS, type=whole_number)
+    _option(threshold, "--scan N", "runs in which changes of regime are looked for (default: 128)", type=_COUNT)
+    _option(threshold, *_JOBS, type=_COUNT)
     _option(threshold, *_SET, **_LIST)
 
-    fit = _add_command(commands, "fit", fit_command,
-        "fit parameters of a scene to a measured time history", """
-        ringsweep fit my.yaml --data run.csv --vary friction.rough.mu_k,zone.half_angle
-        ringsweep fit my.yaml --data run.csv --vary "friction.rough.mu_k=0.1..0.6" --noise "0.5 deg"
-        The first line of run.csv names the columns: t (s), and phi (deg) or x (mm).
-        """)  # fmt: skip
-    fit.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is fitted")
+    fit = _add_command(entries, commands.fit_command, "config CONFIG.yaml", "or OUT.nc, whose scene is fitted")
     _option(fit, "--data RUN.csv", "the measured history", required=True)
     _option(fit, "--vary PATHS", "numbers to fit: PATH or PATH=LOW..HIGH, separated by commas", required=True)
     _option(fit, "-o --output FIT.nc", "default: the configuration's name with -fit")
-    _option(fit, "--start N", "minimisations, each from its start (default: 8)", type=whole_number, default=8)
+    _option(fit, "--start N", "minimisations, each from its start (default: 8)", type=_COUNT, default=8)
     _option(fit, "--noise S", "standard deviation of a measurement (default: by the residuals)")
     _option(fit, *_SET, **_LIST)
 
-    simulate = _add_command(commands, "simulate", simulate_command,
-        "run once, or under each law of a sweep: history and its picture", """
-        ringsweep simulate my.yaml         my-run.nc and my-run.png
-        ringsweep simulate my.yaml --set drive.amplitude=4 --set "zone.half_angle=20 deg"
-        ringsweep simulate my.nc --set drive.amplitude=4     the scene of my.nc, with this amplitude
-        """)  # fmt: skip
-    simulate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
+    simulate = _add_command(entries, commands.simulate_command, "config CONFIG.yaml", "or OUT.nc, whose scene is run")
     _option(simulate, "-o --output RUN.nc", "default: the configuration's name with -run")
     _option(simulate, *_SET, **_LIST)
 
-    plot = _add_command(commands, "plot", plot_command, "draw a stored run, or stored errors against run time", """
-        ringsweep plot my-run.nc           my-run.png: the time history
-        ringsweep plot my-run.nc --from 3 --to 4 -o end.png
-        ringsweep plot my-run.nc --kind phase -o portrait.pdf
-        ringsweep plot my-run.nc --kind friction --law lugre
-        ringsweep plot uncertain.nc --kind sensitivity --word separating --sel drive.amplitude=2
-        """)  # fmt: skip
     stored = "what ringsweep simulate or precision wrote, or a sampled sweep"
-    plot.add_argument("dataset", metavar="RUN.nc", help=stored)
+    plot = _add_command(entries, commands.plot_command, "dataset RUN.nc", stored)
     _option(plot, "-o --output RUN.png", "default: beside RUN.nc; .pdf and .svg too")
     kinds = "phase portrait, or friction force over sliding velocity (belt), in place of the time history; "
     kinds += "of a sampled sweep probabilities (default), survival, or Sobol indices"
@@ -148,73 +89,75 @@ def build_parser() -> argparse.ArgumentParser:
     _option(plot, "--sel DIM=VALUE", "cell of a sampled sweep", **_LIST)
     _option(plot, "--word REGIME", "regime whose Sobol indices are drawn")
     _option(plot, "--law LAW", "the run under this friction law, if RUN.nc has several")
-    _option(plot, "--from T", "draw the history from this time on", type=instant, dest="begin")
-    _option(plot, "--to T", "draw the history up to this time; units allowed", type=instant, dest="end")
+    _option(plot, "--from T", "draw the history from this time on", type=_TIME, dest="begin")
+    _option(plot, "--to T", "draw the history up to this time; units allowed", type=_TIME, dest="end")
 
-    animate = _add_command(commands, "animate", animate_command, "run once: film of the body", """
-        ringsweep animate my.yaml          my-run.gif
-        ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
-        ringsweep animate my.nc -o run.html  a page with buttons, for the scene of my.nc
-        """)  # fmt: skip
-    animate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
+    animate = _add_command(entries, commands.animate_command, "config CONFIG.yaml", "or OUT.nc, whose scene is run")
     _option(animate, "-o --output RUN.gif", "default: the configuration's name with -run; .mp4 and .html too")
     _option(animate, *_SET, **_LIST)
 
-    precision = _add_command(commands, "precision", precision_command,
-        "measure error against run time, and recommend a solver", """
-        ringsweep precision my.yaml
-        ringsweep precision my.yaml --target 1e-9 --cells 64
-        """)  # fmt: skip
-    precision.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is taken")
+    taken = "or OUT.nc, whose sweep is taken"
+    precision = _add_command(entries, commands.precision_command, "config CONFIG.yaml", taken)
     _option(precision, "-o --output OUT.nc", "default: the configuration's name with -precision")
     target = "largest error allowed: rad or m at the end, s at separation (default: 1e-6)"
-    _option(precision, "--target E", target, type=positive_number)
-    _option(precision, "--cells N", "number of cells to measure (default: 16)", type=whole_number)
-    _option(precision, "--rounds N", "timings of each setting (default: 3)", type=whole_number)
+    _option(precision, "--target E", target, type=_POSITIVE)
+    _option(precision, "--cells N", "number of cells to measure (default: 16)", type=_COUNT)
+    _option(precision, "--rounds N", "timings of each setting (default: 3)", type=_COUNT)
 
-    info = _add_command(commands, "info", info_command, "print a summary of a result file", "ringsweep info my.nc")
-    info.add_argument("dataset", metavar="OUT.nc")
-    info.add_argument("--cite", action="store_true", help="print only what a paper that uses it can cite")
+    info = _add_command(entries, commands.info_command, "dataset OUT.nc")
+    _option(info, "--cite", "print only what a paper that uses it can cite")
 
-    verify = _add_command(commands, "verify", verify_command, "check that files are what ringsweep wrote", """
-        ringsweep verify my.nc             exit status 0, or 2 if it is damaged, was changed, or has no seal
-        ringsweep verify results/*.nc
-        """)  # fmt: skip
-    verify.add_argument("files", nargs="+", metavar="FILE.nc")
+    _add_command(entries, commands.verify_command, "files FILE.nc", nargs="+")
 
-    _add_command(commands, "schema", schema_command, "print the JSON schema of the configuration, for editors", """
-        ringsweep schema > schema.json
-        Editors with the YAML language server then check files whose first line is
-            # yaml-language-server: $schema=schema.json
-        """)  # fmt: skip
+    _add_command(entries, commands.schema_command)
 
-    completion = _add_command(commands, "completion", completion_command, "print a completion script for a shell", """
-        ringsweep completion bash > ~/.local/share/bash-completion/completions/ringsweep
-        ringsweep completion zsh > ~/.zfunc/_ringsweep
-        ringsweep completion fish > ~/.config/fish/completions/ringsweep.fish
-        """)  # fmt: skip
-    completion.add_argument("shell", choices=["bash", "zsh", "fish", "tcsh"])
+    shells = ["bash", "zsh", "fish", "tcsh"]
+    _add_command(entries, completion_command, "shell", choices=shells)
     return parser
 
 
 def completion_command(arguments: argparse.Namespace) -> None:
-    """Print a completion script for a shell."""
+    """Print a completion script for a shell.
+
+    ringsweep completion bash > ~/.local/share/bash-completion/completions/ringsweep
+    ringsweep completion zsh > ~/.zfunc/_ringsweep
+    ringsweep completion fish > ~/.config/fish/completions/ringsweep.fish
+    """
     import shtab
 
     print(shtab.complete(build_parser(), arguments.shell))
 
 
-def _add_command(commands: Any, name: str, function: Any, summary: str, examples: str) -> argparse.ArgumentParser:
-    """Add a command with its summary, examples, and the options of all commands."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name,
-        help=summary,
-        description=f"{summary[0].upper()}{summary[1:]}.",
+def _add_command(entries: Any, function: Any, argument: str = "", about: str | None = None, **more: Any) -> Any:
+    """Add a command, whose docstring is its help: the summary, then examples.
+
+    Parameters
+    ----------
+    entries : argparse action
+        What the command is added to.
+    function : callable
+        Takes the parsed arguments.
+    argument : str, optional
+        Name of its argument, and what that is called.
+    about : str, optional
+        Help of the argument.
+    **more
+        Further keywords of the argument for argparse.
+    """
+    # Without docstrings, as with python -OO, there is no help.
+    summary, _, examples = (function.__doc__ or "").partition("\n")
+    parser = entries.add_parser(
+        function.__name__.removesuffix("_command"),
+        help=f"{summary[:1].lower()}{summary[1:].rstrip('.')}",
+        description=summary,
         epilog="examples:\n" + indent(dedent(examples).strip(), "  "),
         formatter_class=_formatter,
     )
     _add_verbosity(parser)
     parser.set_defaults(command=function, parser=parser)
+    if argument:
+        name, *value = argument.split()
+        parser.add_argument(name, metavar=value[0] if value else None, help=about, **more)
     return parser
 
 
@@ -274,27 +217,22 @@ class _Parser(argparse.ArgumentParser):
         super().error(shortened(message, 1000))
 
 
-def whole_number(text: str) -> int:
-    """A whole number of at least 1, from an argument."""
-    if not text.isdecimal() or len(text) > 18 or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
-    return int(text)
+def _number(name: str = "the number", unit: str = "1", **interval: Any) -> Callable[[str], float]:
+    """What makes a number in an interval of an argument, which may have a unit."""
+
+    def read(text: str) -> float:
+        from ringsweep.quantities.parameters import Parameter
+        from ringsweep.quantities.units import quantity
+
+        try:
+            number = quantity(text, Parameter(unit, name, **interval), "")
+        except InputError as error:
+            raise argparse.ArgumentTypeError(error.problem) from None
+        return int(number) if "whole" in interval else number
+
+    return read
 
 
-def instant(text: str) -> float:
-    """A time in seconds, from an argument that may have a unit."""
-    from ringsweep.quantities.parameters import Parameter
-    from ringsweep.quantities.units import quantity
-
-    try:
-        return quantity(text, Parameter("s", "the time"), "time")
-    except InputError as error:
-        raise argparse.ArgumentTypeError(error.problem) from None
-
-
-def positive_number(text: str) -> float:
-    """A finite number greater than 0, from an argument."""
-    with suppress(ValueError):
-        if 0.0 < float(text) < math.inf:
-            return float(text)
-    raise argparse.ArgumentTypeError(f"{text!r} is not a number greater than 0")
+_COUNT = _number(lower=1, upper=10**9, whole=True)
+_POSITIVE = _number(lower=0, open_lower=True)
+_TIME = _number("the time", "s")
