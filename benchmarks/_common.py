@@ -169,7 +169,7 @@ def machine(also: Sequence[str] = ()) -> str:
     models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     load = f", load {os.getloadavg()[0]:.2f} at the start" if hasattr(os, "getloadavg") else ""
     versions = [f"{platform.system()}, python {platform.python_version()}"]
-    for name in ("ringsweep", "numba", "llvmlite", "numpy", "scipy", *also):
+    for name in ("ringsweep", "numba", "llvmlite", "numpy", "scipy", "joblib", *also):
         try:
             versions.append(f"{name} {version(name)}")
         except PackageNotFoundError:

@@ -1,6 +1,7 @@
-"""Sweeps on the workers of a Dask scheduler."""
+"""Sweeps on other workers than threads: those of a Dask scheduler, and those that the user names to joblib."""
 
 import logging
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -9,17 +10,19 @@ import threading
 from time import sleep
 
 import dask
+import joblib
 import numpy as np
 import pytest
 import yaml
 from distributed import LocalCluster
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+from tiers import mostly_slow
 
 import ringsweep
 from benchmarks.hostile.attack import same_bits
 from ringsweep import cli
 from ringsweep.runs import dask as remote
 from ringsweep.runs.executors import Execution
-from ringsweep.runs.needs import cores
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint
 
@@ -66,15 +69,93 @@ def test_workers_of_a_scheduler_find_the_same_impacts_as_threads(cluster, scene,
     assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
 
 
-@pytest.mark.parametrize(("jobs", "threads"), [(None, cores()), (3, 3)])
-def test_threads_are_as_many_as_cores_or_as_asked_for(jobs, threads):
-    with Execution(jobs).open() as local:
-        assert local.concurrency() == threads
+@pytest.fixture(scope="module")
+def by_threads(scene, tmp_path_factory):
+    """Axes of a sweep of 120 cells, and its result file by threads."""
+    axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 12), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 10))}
+    path = tmp_path_factory.mktemp("threads") / "threads.nc"
+    ringsweep.sweep(scene, axes, path, progress=False).close()
+    return axes, path
+
+
+@pytest.mark.parametrize("backend", mostly_slow(["loky", "threading"], ("threading",)))
+def test_workers_that_joblib_is_told_to_use_give_the_same_bits(scene, by_threads, tmp_path, monkeypatch, backend):
+    axes, path = by_threads
+    monkeypatch.setattr(TaskSizes, "max_cells", 4)
+    monkeypatch.setattr("ringsweep.runs.grid.compute_task", _named_by_process())
+    put, processes = Checkpoint.put, set()
+
+    def noted(self, positions, columns, process):
+        processes.add(process)
+        put(self, positions, columns, process)
+
+    monkeypatch.setattr(Checkpoint, "put", noted)
+    with joblib.parallel_config(backend=backend, n_jobs=2):
+        ringsweep.sweep(scene, axes, tmp_path / "out.nc", progress=False).close()
+    assert (str(os.getpid()) in processes) == (backend == "threading")
+    assert same_bits(path, tmp_path / "out.nc")
+
+
+def _named_by_process():
+    """A function that computes a task and tells its process in place of its processor. Loky sends it by value."""
+
+    def named(*arguments):
+        import os
+        from dataclasses import replace
+
+        from ringsweep.runs.cells import compute_task
+
+        return replace(compute_task(*arguments), processor=str(os.getpid()))
+
+    return named
+
+
+@pytest.mark.slow
+def test_tasks_of_killed_processes_are_computed_when_the_sweep_goes_on(scene, by_threads, tmp_path, monkeypatch):
+    axes, path = by_threads
+    monkeypatch.setattr(TaskSizes, "max_cells", 4)
+    put = Checkpoint.put
+
+    def kill_all(self, *rest):
+        put(self, *rest)
+        # Early, and all of them: those that are left might finish all tasks before the death of one is noticed.
+        if len(self.files) == 1:
+            for child in multiprocessing.active_children():
+                if child.name.startswith("LokyProcess"):
+                    os.kill(child.pid, signal.SIGKILL)
+
+    target = tmp_path / "out.nc"
+    with joblib.parallel_config(backend="loky", n_jobs=2):
+        with monkeypatch.context() as patch:
+            patch.setattr(Checkpoint, "put", kill_all)
+            with pytest.raises(TerminatedWorkerError) as caught:
+                ringsweep.sweep(scene, axes, target, progress=False)
+        assert "cells are kept in" in caught.value.__notes__[0]
+        ringsweep.sweep(scene, axes, target, progress=False).close()
+    assert same_bits(path, target)
+
+
+@pytest.mark.parametrize(
+    ("given", "own", "workers"), [({}, None, joblib.cpu_count()), ({"n_jobs": 3}, None, 3), ({"n_jobs": 3}, 2, 2)]
+)
+@pytest.mark.parametrize("backend", [{}, {"backend": "threading"}, {"backend": "loky"}])
+def test_number_of_workers_is_that_of_the_call_then_that_of_joblib_then_that_of_cores(backend, given, own, workers):
+    with joblib.parallel_config(**backend, **given), Execution(own).open() as local:
+        assert local.concurrency() == workers
+
+
+def test_backend_that_keeps_its_results_until_the_end_is_refused(scene):
+    with (
+        joblib.parallel_config(backend="multiprocessing", n_jobs=2),
+        pytest.raises(ringsweep.InputError, match="MultiprocessingBackend returns results only at the end"),
+    ):
+        ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, progress=False)
 
 
 #: A scheduler with one worker, in one process.
 ALONE = """
 from distributed import LocalCluster
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 cluster = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None)
 print(cluster.scheduler_address, flush=True)
 input()

@@ -128,7 +128,7 @@ class Workers:
         """Results in the order in which they are finished; see :class:`ringsweep.runs.executors.Executor`.
 
         If a worker dies, its task goes to another worker. A task that kills several workers raises
-        `distributed.KilledWorker`.
+        `distributed.KilledWorker`. (joblib's Dask backend would then wait for ever, and counts the workers only once.)
         """
         key = secrets.token_hex(8)
         plugin = _SendCompute(key, compute)

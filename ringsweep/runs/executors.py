@@ -1,4 +1,4 @@
-"""Executors of the tasks of a sweep: threads of this process, or the workers of a Dask scheduler."""
+"""Executors of the tasks of a sweep: threads of this machine, or the workers of a Dask scheduler."""
 
 from __future__ import annotations
 
@@ -11,15 +11,19 @@ import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from itertools import islice
+from multiprocessing import resource_tracker
 from queue import SimpleQueue
 from typing import Any, Protocol, Self, TypeVar
 
+import joblib
 import numpy as np
+from joblib.parallel import get_active_backend
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from ringsweep.errors import InputError
-from ringsweep.runs.needs import cores, duration
+from ringsweep.runs.needs import duration
 
 logger = logging.getLogger("ringsweep")
 
@@ -59,20 +63,30 @@ class Executor(Protocol):
 
 
 class Local:
-    """Threads of this process: kernels run without Python's lock.
+    """Workers of this machine by joblib: threads, or those that the user names with :func:`joblib.parallel_config`.
 
     Parameters
     ----------
     jobs : int, optional
-        Number of threads; one for each core by default.
+        Number of workers; by default that of the user's configuration of joblib, or else all cores.
     """
 
     def __init__(self, jobs: int | None):
-        self._threads = jobs or cores()
+        # If threads are only preferred, joblib forgets the number that the user has set.
+        self._jobs = jobs or get_active_backend()[1] or -1
+        backend, _ = get_active_backend(prefer="threads")
+        self._workers: int = backend.effective_n_jobs(self._jobs)
+        self._shared = self._workers == 1 or getattr(backend, "supports_sharedmem", False)
+        self._alone = 0 if self._shared else 1
+        if not self._shared and not backend.supports_return_generator:
+            raise InputError(
+                "joblib.parallel_config",
+                f"{type(backend).__name__} returns results only at the end: name another, as loky",
+            )
 
     def concurrency(self) -> int:
-        """Number of threads."""
-        return self._threads
+        """Number of workers."""
+        return self._workers
 
     def results(
         self,
@@ -88,42 +102,87 @@ class Local:
         ends the wait, or is thrown into the generator, what is finished is still handed over.
         """
         found: SimpleQueue[Result | BaseException | None] = SimpleQueue()
-        lock = threading.Lock()
+        lock, working = threading.Lock(), self._workers
+        parallel = joblib.Parallel(self._jobs, return_as="generator_unordered", prefer="threads", batch_size=1)
+
+        def finish(outcome: Result | BaseException) -> None:
+            if isinstance(outcome, BaseException):
+                stopped.set()
+            else:
+                with lock:
+                    learn(outcome)
+            found.put(outcome)
+
+        def work_here() -> None:
+            nonlocal working
+            while not stopped.is_set():
+                with lock:
+                    task = next(tasks, None)
+                if task is None:
+                    break
+                finish(_attempt(compute, task))
+            with lock:
+                working -= 1
+            # joblib would poll for the end of its calls, 10 ms for each round of a refined sweep.
+            if not working:
+                found.put(None)
 
         def work() -> None:
             try:
-                while not stopped.is_set():
-                    with lock:
-                        task = next(tasks, None)
-                    if task is None:
-                        break
-                    result = compute(task)
-                    with lock:
-                        found.put(learn(result))
+                if self._workers == 1:
+                    work_here()
+                    return
+                if self._shared:
+                    # One call for each thread, which takes task after task: a call of joblib costs a millisecond.
+                    for _ in parallel(joblib.delayed(work_here)() for _ in range(self._workers)):
+                        pass
+                    return
+                _shield_from_interrupts()
+                # The first task runs alone: the other processes find its kernels compiled.
+                for some in (islice(tasks, self._alone), tasks):
+                    for outcome in parallel(joblib.delayed(_attempt)(compute, task) for task in some):
+                        finish(outcome)
+                self._alone = 0
             except BaseException as error:
-                stopped.set()
-                found.put(error)
+                # Once the sweep is to stop, it is no news that workers ended with their tasks.
+                if not stopped.is_set():
+                    found.put(error)
             found.put(None)
 
-        for _ in range(self._threads):
-            # A daemon, so that a second Ctrl-C need not wait for its task.
+        failure = None
+        # Its exit kills processes that still have tasks.
+        with nullcontext() if self._shared else parallel:
+            # A daemon, as joblib's threads are, so that a second Ctrl-C need not wait for their tasks.
             threading.Thread(target=work, daemon=True).start()
-        working, failure = self._threads, None
-        try:
-            while working:
-                if isinstance(item := found.get(), BaseException):
-                    failure = failure or item
-                elif item is None:
-                    working -= 1
-                else:
-                    yield item
-        except KeyboardInterrupt:
-            while not found.empty():
-                if (item := found.get()) is not None and not isinstance(item, BaseException):
-                    yield item
-            raise
+            try:
+                while (item := found.get()) is not None:
+                    if isinstance(item, BaseException):
+                        failure = failure or item
+                    else:
+                        yield item
+            except KeyboardInterrupt:
+                while not found.empty():
+                    if (item := found.get()) is not None and not isinstance(item, BaseException):
+                        yield item
+                raise
         if failure is not None:
             raise failure
+
+
+def _attempt(compute: Callable[[Positions], Result], task: Positions) -> Result | BaseException:
+    """Result of a task, or its error: if a task raised it, joblib would drop what other tasks have finished."""
+    try:
+        return compute(task)
+    except BaseException as error:
+        return error
+
+
+def _shield_from_interrupts() -> None:
+    """Keep Ctrl-C from processes that this thread starts: a terminal sends it to them too, but tasks are to end."""
+    if hasattr(signal, "pthread_sigmask"):
+        # Its start would undo this before Python 3.12.
+        resource_tracker.ensure_running()
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 @dataclass(frozen=True)
@@ -133,7 +192,7 @@ class Execution:
     Attributes
     ----------
     jobs : int, optional
-        Number of threads; see :class:`Local`.
+        Number of workers of this machine; see :class:`Local`.
     scheduler : str, optional
         Address of a Dask scheduler whose workers compute the cells.
     progress : bool
@@ -145,12 +204,12 @@ class Execution:
     progress: bool = True
 
     def open(self) -> AbstractContextManager[Executor]:
-        """Threads of this process, or the workers of the Dask scheduler.
+        """Workers of this machine, or those of the Dask scheduler.
 
         Raises
         ------
         InputError
-            If the number of threads is not positive, if a scheduler is given too, or if no scheduler answers.
+            If the number of workers is not positive, if a scheduler is given too, or if no scheduler answers.
         """
         if self.jobs is not None and self.jobs < 1:
             raise InputError("jobs", f"{self.jobs} threads cannot compute anything: give at least 1")

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
 
+import joblib
 import numpy as np
 
 from ringsweep.config import Config
@@ -85,16 +86,6 @@ def memory_of_machine() -> float:
     return found
 
 
-def cores() -> int:
-    """Number of processors that this process may use."""
-    found = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    # A container may have a share of their time only.
-    with suppress(OSError, ValueError):
-        quota, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
-        found = min(found, math.ceil(int(quota) / int(period)))
-    return found
-
-
 def describe(config: Config, target: Path, jobs: int | None, reuse: str | os.PathLike[str] | None = None) -> str:
     """Cells, memory, disk and estimated time of a sweep, as lines of text. Some of its runs are begun for it.
 
@@ -105,7 +96,7 @@ def describe(config: Config, target: Path, jobs: int | None, reuse: str | os.Pat
     InputError
         If it fits neither into the memory nor onto the disk.
     """
-    plan, folder, threads = plan_of(config, reuse), target.resolve().parent, jobs or cores()
+    plan, folder, threads = plan_of(config, reuse), target.resolve().parent, jobs or joblib.cpu_count()
     sizes, total, key = plan.config.axes.sizes, plan.grid.total, fingerprint(identity(plan.config))
     done = cells_done(target.resolve(), key) // plan.parts_of_cell
     if target.exists():

@@ -63,7 +63,7 @@ def run(
         NetCDF file to write. Until it is complete, finished cells are kept in a folder beside it, and not in memory. If
         the sweep is stopped, the same call continues it.
     jobs : int, optional
-        Number of threads; all cores by default.
+        Number of threads; by default that of ``joblib.parallel_config``, or else all cores.
     fresh : bool
         Whether to discard what an earlier call computed.
     reuse : path-like, optional
