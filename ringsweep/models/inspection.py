@@ -14,7 +14,7 @@ from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.models.sliding import ENDS
-from ringsweep.models.slip import couplings, deflection_rates
+from ringsweep.models.slip import by_deflections, deflection_rates
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import contact, ring
@@ -122,18 +122,18 @@ def inspection(scene, y, place, forcing, angle):
         slope,
         gradient[0],
         gradient[1] - now.damping,
-        _creep(now.bristles, couplings(now.bristles, scene, now), slope),
+        _creep(now.bristles, by_deflections(now.bristles, scene, now), slope),
         stuck,
     )
 
 
 @unrolled
-def _creep(count, bristles, by_bristles, slope):
+def _creep(count, bristles, by_z, slope):
     """Trace and determinant of sliding with its bristles; an empty tuple without bristles."""
     if count == 0:
         return ["return ()"]
     decay = "-bristles[0].rate_z" if count == 1 else "max(-bristles[0].rate_z, -bristles[1].rate_z)"
-    coupling = " + ".join(f"abs(by_bristles[{i}][0] * by_bristles[{i}][1])" for i in range(count))
+    coupling = " + ".join(f"abs(by_z[{i}] * bristles[{i}].rate_v)" for i in range(count))
     return [f"decay, coupling = {decay}, {coupling}", "return decay - slope, coupling - decay * slope"]
 
 

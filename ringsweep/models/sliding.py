@@ -9,7 +9,7 @@ import numpy as np
 from ringsweep.compile import hook, inlined
 from ringsweep.models.interface import audit, implicit, modes, series
 from ringsweep.models.interface.status import JAM, RUNNING, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
-from ringsweep.models.slip import acceleration_slopes, couplings
+from ringsweep.models.slip import acceleration_slopes, by_deflections
 from ringsweep.numerics.series import slope, value
 from ringsweep.numerics.terms import set_terms, terms
 from ringsweep.physics import contact, drives, ring
@@ -173,14 +173,12 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     scales = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
     speed, deflection = scales[1], scales[2]
     allowed = (1.0 / s + abs(acceleration_slopes(scene, now)[1])) * speed
-    by_bristles = couplings(now.bristles, scene, now)
-    for i in range(len(by_bristles)):
-        by_z, rate_v, rate_z = by_bristles[i]
-        allowed += abs(by_z) * deflection
-        error = abs(now.bristles[i].rate - rates[2 + i])
-        largest = larger(
-            largest, error / ((1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed + _ROUNDING * abs(v))
-        )
+    by_z = by_deflections(now.bristles, scene, now)
+    for i in range(len(by_z)):
+        bundle = now.bristles[i]
+        allowed += abs(by_z[i]) * deflection
+        scale = (1.0 / s + abs(bundle.rate_z)) * deflection + abs(bundle.rate_v) * speed + _ROUNDING * abs(v)
+        largest = larger(largest, abs(bundle.rate - rates[2 + i]) / scale)
     normals = ring.reactions(body, *now.K, now.motion)
     violation, power = of_balances(scene, now.K, normals, now.motion, forcing, rates[1], (allowed, terms, tolerance))
     return larger(larger(largest, -mode.sign * v / speed), violation), power

@@ -97,13 +97,21 @@ def _none(count, bristles):
 
 
 @unrolled
-def couplings(count, bristles, scene, now):
-    """Bristles and sliding velocity: the third result of :func:`implicit.linearise`."""
-    lines = ["radius = ring.radius(scene.body)"]
-    for i, slopes in zip(range(count), ("a.by_z, 0.0", "0.0, a.by_z"), strict=False):
-        by_z = f"radius * ring.acceleration_slope(scene.body, *now.K, {slopes}, now.motion)"
-        lines += [f"a = bristles[{i}]", f"bundle_{i} = {by_z}, a.rate_v, a.rate_z"]
-    return [*lines, "return (" + "".join(f"bundle_{i}, " for i in range(count)) + ")"]
+def by_deflections(count, bristles, scene, now):
+    """Derivatives of the sliding acceleration by the deflection of each bundle of bristles, 1/s^2."""
+    slopes = [", ".join(f"bristles[{i}].by_z" if i == k else "0.0" for k in (0, 1)) for i in range(count)]
+    found = (f"radius * ring.acceleration_slope(scene.body, *now.K, {pair}, now.motion), " for pair in slopes)
+    return ["radius = ring.radius(scene.body)", f"return ({''.join(found)})"]
+
+
+@unrolled
+def _rows_of_deflections(count, bristles):
+    """Rows of the Jacobian for the rates of the deflections."""
+    rows = []
+    for i in range(count):
+        by_z = "".join(f"bristles[{i}].rate_z, " if k == i else "0.0, " for k in range(count))
+        rows.append(f"(0.0, bristles[{i}].rate_v, {by_z}), ")
+    return [f"return ({''.join(rows)})"]
 
 
 @implicit.rates.implements(Ring, BristleRing, Belt, BristleBelt)
@@ -121,11 +129,13 @@ def _linearise(scene, mode, common, t, forcing, x):
     by_place, by_v, by_drive = acceleration_slopes(scene, now)
     by_force = force_rate(scene.drive, forcing) / scene.body.mass
     by_time = by_place * forcing[1] + by_drive * forcing[2] + by_force - radius * drives.jerk_at(scene.drive, t)
+    nothing = _none(now.bristles)
+    first = joined((0.0, 1.0 / radius), nothing)
+    second = joined((by_place, by_v), by_deflections(now.bristles, scene, now))
     return (
         joined((now.place_rate, radius * (acceleration - forcing[2])), deflection_rates(now.bristles)),
-        (0.0, 1.0 / radius, by_place, by_v),
-        couplings(now.bristles, scene, now),
-        joined((0.0, by_time), _none(now.bristles)),
+        joined((first, second), _rows_of_deflections(now.bristles)),
+        joined((0.0, by_time), nothing),
     )
 
 
@@ -136,7 +146,7 @@ def relaxes(scene, linear, frequency):
     And the transient must be over: transients into the stiction band, and out of it at its top, are as fast as the
     decay itself.
     """
-    acceleration, decay = linear[0][1], -linear[1][3]
+    acceleration, decay = linear[0][1], -linear[1][1][1]
     return decay > 50.0 * frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
 
 

@@ -108,7 +108,7 @@ def _creep(scene, run, h_max, tolerance, scratch):
         return False, -1, 0.0, run.y, run.record, control, 0.0
     if control.last_h == 0.0:
         # The transient into creep decays at this rate.
-        control = StepControl(min(control.h, -1.0 / start.linear[1][3]), 0.0, 0.0, True)
+        control = StepControl(min(control.h, -1.0 / start.linear[1][1][1]), 0.0, 0.0, True)
     guard, s, y, record, control, error = implicit_step(scene, run.record, start, control, h_max, tolerance, scratch)
     return True, guard, s, y, record, control, error
 

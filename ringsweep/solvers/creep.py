@@ -155,9 +155,8 @@ def _error_norm(error, scales, linear):
 
     Infinite if a component is not a number.
     """
-    _, core, bristles, _ = linear
     # Stiff bristles turn a small error of the velocity into a large error of the force.
-    norm = rosenbrock.acceleration_error(bristles, core, error, scales) / _ACCELERATION_FACTOR
+    norm = rosenbrock.acceleration_error(error, linear[1]) / (_ACCELERATION_FACTOR * scales[len(error)])
     if not norm >= 0.0:
         norm = inf
     for k in range(len(error)):

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringsweep.compile import function_from_lines, hook, unrolled
-from ringsweep.models.interface import implicit
+from ringsweep.compile import unrolled
+
+# The lines of `step` use it.
+from ringsweep.models.interface import implicit  # noqa: F401
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -132,8 +134,8 @@ def step(length, x, scene, start, h, forcings, bends):
     """
     parts = range(length)
     lines = [
-        "mode, common, (f, jacobian, bristles, by_time) = start.mode, start.common, start.linear",
-        "per_h, factors = 1.0 / h, factorise(bristles, jacobian, 1.0 / (GAMMA * h))",
+        "mode, common, (f, jacobian, by_time) = start.mode, start.common, start.linear",
+        "per_h, matrix = 1.0 / h, inverse(jacobian, 1.0 / (GAMMA * h))",
     ]
     for i in range(STAGES):
         if 0 < i < 6:
@@ -148,8 +150,8 @@ def step(length, x, scene, start, h, forcings, bends):
             coupling = " + ".join(f"{float(C[i, j])} * k{j}_{c}" for j in range(i))
             by_time = f" + h * {float(TIME_DERIVATIVE_WEIGHTS[i])} * by_time[{c}]" if TIME_DERIVATIVE_WEIGHTS[i] else ""
             lines.append(f"r{c} = f[{c}]{by_time}" + (f" + per_h * ({coupling})" if i else ""))
-        names, right = "".join(f"k{i}_{c}, " for c in parts), "".join(f"r{c}, " for c in parts)
-        lines.append(f"{names} = solve(bristles, factors, ({right}))")
+        for c in parts:
+            lines.append(f"k{i}_{c} = " + " + ".join(f"matrix[{c}][{j}] * r{j}" for j in parts))
     for row in range(3):
         for c in parts:
             lines.append(
@@ -160,99 +162,27 @@ def step(length, x, scene, start, h, forcings, bends):
     return [*lines, f"return ({after}), ({error})"]
 
 
-@hook(optional=True)
-def factorise(bristles, jacobian, shift):
-    """Factors of ``shift I - J`` for :func:`solve`; see :func:`implicit.linearise` for `bristles` and `jacobian`."""
-    return _factorise(bristles, jacobian, shift)
+@unrolled
+def inverse(length, jacobian, shift):
+    """Inverse of ``shift I - J``, row by row, by Gauss-Jordan elimination without pivoting.
 
-
-@hook(optional=True)
-def solve(bristles, factors, right):
-    """Solution k of ``(shift I - J) k = right``, with the result of :func:`factorise`; a tuple like `right`."""
-    return _solve(bristles, factors, right)
-
-
-@hook(optional=True)
-def acceleration_error(bristles, jacobian, error, scales):
-    """Error of the acceleration that follows from the `error` of velocity and deflections, in units of the last scale.
-
-    Zero without bristles.
+    The last components are eliminated first: the derivative of a deflection's rate by the deflection is never positive.
     """
-    return _acceleration_error(bristles, jacobian, error, scales)
+    parts = range(length)
+    lines = [f"m{i}{j} = {'shift ' if i == j else ''}-jacobian[{i}][{j}]" for i in parts for j in parts]
+    for k in reversed(parts):
+        others = [i for i in parts if i != k]
+        lines += [f"m{k}{k} = 1.0 / m{k}{k}", *(f"m{k}{j} *= m{k}{k}" for j in others)]
+        for i in others:
+            lines += [*(f"m{i}{j} -= m{i}{k} * m{k}{j}" for j in others), f"m{i}{k} *= -m{k}{k}"]
+    rows = ", ".join("(" + "".join(f"m{i}{j}, " for j in parts) + ")" for i in parts)
+    return [*lines, f"return {rows},"]
 
 
 @unrolled
-def _factorise(count, bristles, jacobian, shift):
-    """Factors of ``shift I - J`` for :func:`solve`.
-
-    J is the Jacobian of place, velocity and deflections. See :func:`ringsweep.models.interface.implicit.linearise` for
-    `jacobian` and `bristles`. The derivative of a deflection's rate with respect to the deflection is never positive,
-    so that the bristles are eliminated without pivoting.
-    """
-    numbers = range(count)
-    return [
-        "j00, j01, j10, j11 = jacobian",
-        "w00, w11 = shift - j00, shift - j11",
-        *(f"b{i}, c{i}, d{i} = bristles[{i}]; p{i} = 1.0 / (shift - d{i})" for i in numbers),
-        *(f"w11 -= b{i} * c{i} * p{i}" for i in numbers),
-        "inverse = 1.0 / (w00 * w11 - j01 * j10)",
-        "eliminated = (" + "".join(f"(p{i}, b{i} * p{i}, c{i} * p{i}), " for i in numbers) + ")",
-        "return w11 * inverse, j01 * inverse, j10 * inverse, w00 * inverse, eliminated",
-    ]
-
-
-@unrolled
-def _solve(count, bristles, factors, right):
-    numbers = range(count)
-    return [
-        "m00, m01, m10, m11, eliminated = factors",
-        "r0, r1 = right[0], right[1]",
-        *(f"r1 += eliminated[{i}][1] * right[{i + 2}]" for i in numbers),
-        "k1 = m10 * r0 + m11 * r1",
-        "return (m00 * r0 + m01 * r1, k1, "
-        + "".join(f"eliminated[{i}][0] * right[{i + 2}] + eliminated[{i}][2] * k1, " for i in numbers)
-        + ")",
-    ]
-
-
-@unrolled
-def _acceleration_error(count, bristles, jacobian, error, scales):
-    terms = "".join(f" + bristles[{i}][0] * error[{i + 2}]" for i in range(count))
-    return [f"return abs(jacobian[3] * error[1]{terms}) / scales[{count + 2}]" if count else "return 0.0"]
-
-
-# The velocity relaxes fastest, so that it is eliminated first, and nothing else needs a pivot.
-_ELIMINATED = (1, 3, 2, 0)
-
-
-def _factors_of_four() -> list[str]:
-    lines = [f"a{i}{j} = {'shift ' if i == j else ''}- bristles.rows[{i}][{j}]" for i in range(4) for j in range(4)]
-    for place, i in enumerate(_ELIMINATED):
-        lines.append(f"p{i} = 1.0 / a{i}{i}")
-        for j in _ELIMINATED[place + 1 :]:
-            lines.append(f"a{j}{i} *= p{i}")
-            lines += [f"a{j}{k} -= a{j}{i} * a{i}{k}" for k in _ELIMINATED[place + 1 :]]
-    rows = "".join(f"({', '.join(f'a{i}{j}' for j in range(4))}), " for i in range(4))
-    return [*lines, f"return ({rows}), (p0, p1, p2, p3), 1.0 / shift"]
-
-
-def _solution_of_four() -> list[str]:
-    lines = ["a, p, rest = factors", *(f"r{i} = right[{i}]" for i in range(4))]
-    for place, i in enumerate(_ELIMINATED):
-        lines += [f"r{j} -= a[{j}][{i}] * r{i}" for j in _ELIMINATED[place + 1 :]]
-    for place, i in reversed(list(enumerate(_ELIMINATED))):
-        known = "".join(f" - a[{i}][{j}] * r{j}" for j in _ELIMINATED[place + 1 :])
-        lines.append(f"r{i} = (r{i}{known}) * p[{i}]")
-    return [*lines, "return r0, r1, r2, r3, rest * right[4]"]
-
-
-factorise.implements(implicit.Coupled)(function_from_lines("bristles, jacobian, shift", _factors_of_four(), {}))
-solve.implements(implicit.Coupled)(function_from_lines("bristles, factors, right", _solution_of_four(), {}))
-
-
-@acceleration_error.implements(implicit.Coupled)
-def _no_acceleration_error(bristles, jacobian, error, scales):
-    return 0.0
+def acceleration_error(length, error, jacobian):
+    """Error of the acceleration, m/s^2, that follows from the `error` of velocity and deflections."""
+    return ["return abs(" + " + ".join(f"jacobian[1][{i}] * error[{i}]" for i in range(1, length)) + ")"]
 
 
 @unrolled

@@ -24,7 +24,7 @@ def _error_scales(scene, tolerance, x):
     # A load that varies may come from the displacement alone, whose size the launch tells.
     launch_x, launch_v = ring.if_load_varies(scene.body, (abs(scene.initial_x), abs(scene.initial_v)), (0.0, 0.0))
     length = launch_x + length_scale(scene, abs(drives.turn(scene.drive, scene.span)[1]) + launch_v)
-    return tolerance * length, tolerance * stiction_band(scene.law)
+    return tolerance * length, tolerance * stiction_band(scene.law), inf
 
 
 @slip.implements(belt.Belt)

@@ -89,8 +89,8 @@ def _gradient_of_guard(scene, mode, guard, t, y, rates):
 def _bristle_jacobian(scene, mode, t, y):
     forcing = drives.turn(scene.drive, t)
     linear = implicit.linearise(scene, mode, (), t, forcing, implicit.to_implicit(scene, forcing, y))
-    _, (_, _, by_place, by_v), ((by_z, rate_v, rate_z),), _ = linear
-    return 0.0, 1.0, 0.0, by_place, by_v, by_z, 0.0, rate_v, rate_z
+    first, second, third = linear[1]
+    return *first, *second, *third
 
 
 @_gradient.implements(BristleBelt)

@@ -10,25 +10,11 @@ two time derivatives. A *view* is what a solver needs to know of a state: the gu
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 from ringsweep.compile import absorbed, hook
 from ringsweep.physics import drives
 
 #: Tolerance of an implicit step, in units of the tolerance of the series.
 IMPLICIT_TOLERANCE = 1e3
-
-
-class Coupled(NamedTuple):
-    """In place of the bristles of :func:`linearise`: a state of four coupled components, and a fifth that is constant.
-
-    Attributes
-    ----------
-    rows : tuple of tuple of float
-        Jacobian of the four components.
-    """
-
-    rows: Any
 
 
 @hook(optional=True)
@@ -195,12 +181,8 @@ def linearise(scene, mode, common, t, forcing, x):
     Returns
     -------
     tuple
-        ``(rates, jacobian, bristles, by_time)``. ``rates`` is what :func:`rates` returns. ``jacobian`` has four
-        numbers: the Jacobian of place and velocity, row by row. ``bristles`` has one tuple of three numbers for each
-        bundle of bristles: derivative of the sliding acceleration (m/s^2) with respect to the deflection, and
-        derivatives of the rate of the deflection (m/s) with respect to the sliding velocity and to the deflection; or
-        it is :class:`Coupled`.
-        ``by_time`` is the partial derivative of the rates with respect to time.
+        ``(rates, jacobian, by_time)``. ``rates`` is what :func:`rates` returns, ``jacobian`` has its derivatives by
+        the state: one tuple for each rate. ``by_time`` is the partial derivative of the rates with respect to time.
     """
 
 
@@ -220,8 +202,8 @@ def error_scales(scene, tolerance, x):
     Returns
     -------
     tuple of float
-        One positive number for each component of the state, in the unit of the component. With bristles one number
-        more: the error allowed to the sliding acceleration, m/s^2.
+        One positive number for each component of the state, in the unit of the component; and the error allowed to the
+        sliding acceleration, m/s^2, infinite where stiff bristles do not magnify it.
     """
 
 

@@ -6,7 +6,7 @@ numbers, however slow the creep.
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import cos, inf, sin, sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import inlined, unrolled
@@ -80,7 +80,7 @@ def _is_stiff(scene, mode, y, linear):
 
 @implicit.error_scales.implements(ring.Ring)
 def _error_scales(scene, tolerance, x):
-    return tolerance, tolerance * stiction_band(scene.law) * ring.reaction_determinant(scene.body)
+    return tolerance, tolerance * stiction_band(scene.law) * ring.reaction_determinant(scene.body), inf
 
 
 @implicit.guards_and_motion.implements(ring.Ring, ring.BristleRing)

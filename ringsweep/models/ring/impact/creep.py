@@ -91,14 +91,14 @@ def _is_stiff(scene, mode, y, linear):
     # A gap that has just opened grows from zero: its first step is a series.
     if y[2] == 0.0:
         return False
-    body, (_, acceleration, _, _, _), decay = scene.closed.body, linear[0], -linear[1][3]
+    body, (_, acceleration, _, _, _), decay = scene.closed.body, linear[0], -linear[1][1][1]
     natural_frequency = sqrt(body.gravity / body.radius) + abs(y[1]) / body.radius
     return decay > 50.0 * natural_frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
 
 
 @implicit.error_scales.implements(ImpactRing)
 def _error_scales(scene, tolerance, x):
-    place, speed = implicit.error_scales(scene.closed, tolerance, (x[0], x[1]))
+    place, speed, _ = implicit.error_scales(scene.closed, tolerance, (x[0], x[1]))
     gap = tolerance * _GAP_TOLERANCE
     return (
         place,
@@ -106,6 +106,7 @@ def _error_scales(scene, tolerance, x):
         gap,
         gap * (rate_at_rest(scene.closed) + sqrt(scene.closed.body.gravity / scene.balls.reach)),
         1.0,
+        inf,
     )
 
 
@@ -149,15 +150,14 @@ def _linearise(scene, mode, common, t, forcing, x):
         scene, f, friction, found, nothing, (ring_omega, ring_epsilon, drives.jerk_at(scene.drive, t))
     )
     per_radius = 1.0 / scene.closed.body.radius
-    rows = (
-        (0.0, per_radius, 0.0, scene.balls.reach * per_radius),
-        (by_place[0], by_v[0], by_eta[0], by_rate[0]),
-        (0.0, 0.0, 0.0, 1.0),
-        (by_place[1], by_v[1], by_eta[1], by_rate[1]),
+    jacobian = (
+        (0.0, per_radius, 0.0, scene.balls.reach * per_radius, 0.0),
+        (by_place[0], by_v[0], by_eta[0], by_rate[0], 0.0),
+        (0.0, 0.0, 0.0, 1.0, 0.0),
+        (by_place[1], by_v[1], by_eta[1], by_rate[1], 0.0),
+        (0.0, 0.0, 0.0, 0.0, 0.0),
     )
-    jacobian = 0.0, per_radius, by_place[0], by_v[0]
-    rates = _rates_from(scene, forcing, x, f, found)
-    return rates, jacobian, implicit.Coupled(rows), (0.0, by_time[0], 0.0, by_time[1], 0.0)
+    return _rates_from(scene, forcing, x, f, found), jacobian, (0.0, by_time[0], 0.0, by_time[1], 0.0)
 
 
 @inlined
