@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from contourpy import contour_generator
 from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, load
@@ -112,7 +114,7 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
     bisect(ends, tolerance, run)
     for k, dim in enumerate(dims):
         place[dim] = np.where(axis == k, 0.5 * (ends[0] + ends[1]), place[dim])
-    order, line = _joined(low, axis, ds[label].shape)
+    order, line = _joined(inside, usable, 0.5 * (low + high))
     error = 0.5 * np.abs(ends[1] - ends[0])
     if count := int((error > tolerance).sum()):
         logger.warning("%d of %d points are less certain than asked for: runs there are not certified", count, len(low))
@@ -294,38 +296,21 @@ def run_points(config: Config, values: Mapping[str, NDArray[Any]], jobs: int | N
     return compute(points, Execution(jobs, progress=False), warn=False)
 
 
-def _joined(low: NDArray[np.intp], axis: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], Any]:
-    """Order of edges along curves, and the number of the curve of each.
+def _joined(
+    inside: NDArray[np.bool_], usable: NDArray[np.bool_], middles: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+    """Order of pairs of neighbouring cells along curves, and the number of the curve of each.
 
-    A curve enters a square of four cells through one of its edges and leaves it through another.
+    `middles` are the indices halfway between the cells of each pair, shape ``(pairs, dimensions)``.
     """
-    if len(shape) == 1:
-        return np.arange(len(low)), np.arange(len(low), dtype=np.int32)
-    squares: dict[tuple[int, int], list[int]] = {}
-    for edge, ((i, j), along) in enumerate(zip(low.tolist(), axis.tolist(), strict=True)):
-        for square in ((i, j), (i, j - 1)) if along == 0 else ((i, j), (i - 1, j)):
-            squares.setdefault(square, []).append(edge)
-    neighbours: dict[int, list[int]] = {edge: [] for edge in range(len(low))}
-    for (i, j), edges in squares.items():
-        pairs = [edges]
-        if len(edges) == 4:
-            # Both diagonals are possible; the curves part the first cell from the last.
-            known = {(int(axis[e]), int(low[e, 0]) - i, int(low[e, 1]) - j): e for e in edges}
-            pairs = [[known[0, 0, 0], known[1, 0, 0]], [known[0, 0, 1], known[1, 1, 0]]]
-        for pair in pairs:
-            if len(pair) == 2:
-                neighbours[pair[0]].append(pair[1])
-                neighbours[pair[1]].append(pair[0])
-    order: list[int] = []
-    line: list[int] = []
-    left = set(neighbours)
-    # First from the ends of open curves, then around closed ones.
-    for start in sorted(neighbours, key=lambda edge: len(neighbours[edge])):
-        at: int | None = start if start in left else None
-        number = line[-1] + 1 if line else 0
-        while at is not None:
-            left.discard(at)
-            order.append(at)
-            line.append(number)
-            at = next((one for one in neighbours[at] if one in left), None)
-    return np.array(order, dtype=np.intp), np.array(line, dtype=np.int32)
+    number = {tuple(middle): k for k, middle in enumerate(middles.tolist())}
+    curves: list[list[int]] = []
+    if inside.ndim == 2 and min(inside.shape) > 1:
+        levels = np.ma.masked_array(inside.astype(float), ~usable)
+        # The last point of a closed curve is its first one.
+        for curve in contour_generator(z=levels, corner_mask=True).lines(0.5):
+            curves.append(list(dict.fromkeys(number[y, x] for x, y in np.asarray(curve).tolist())))
+    curves += [[k] for k in sorted(set(number.values()).difference(*curves))]
+    lengths = [len(curve) for curve in curves]
+    order = np.fromiter(chain.from_iterable(curves), np.intp)
+    return order, np.repeat(np.arange(len(curves), dtype=np.int32), lengths)
