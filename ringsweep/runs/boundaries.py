@@ -307,9 +307,10 @@ def _joined(
     curves: list[list[int]] = []
     if inside.ndim == 2 and min(inside.shape) > 1:
         levels = np.ma.masked_array(inside.astype(float), ~usable)
-        # The last point of a closed curve is its first one.
         for curve in contour_generator(z=levels, corner_mask=True).lines(0.5):
-            curves.append(list(dict.fromkeys(number[y, x] for x, y in np.asarray(curve).tolist())))
+            # The last point of a closed curve is its first. Beside a cell that is left out, one may be on a diagonal.
+            found = (number.get((y, x)) for x, y in np.asarray(curve).tolist())
+            curves.append([k for k in dict.fromkeys(found) if k is not None])
     curves += [[k] for k in sorted(set(number.values()).difference(*curves))]
     lengths = [len(curve) for curve in curves]
     order = np.fromiter(chain.from_iterable(curves), np.intp)
