@@ -5,7 +5,6 @@ import subprocess
 import sys
 import threading
 import tracemalloc
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -256,29 +255,21 @@ def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
     assert peak < 8e6
 
 
-def test_task_that_runs_long_is_named_with_its_coordinates_and_then_its_longest_cell(monkeypatch):
+def test_task_that_runs_long_is_named_with_its_coordinates(monkeypatch):
     """Here each task does: the block ends after the line was written."""
     named = threading.Event()
     monkeypatch.setattr(cells, "LONG", 0.001)
     monkeypatch.setattr(cells, "_compiled", set())
     cells._watch_from.cache_clear()
     run = RK4Method.run
-
-    def slow(*arguments):
-        named.wait(10.0)
-        result = run(*arguments)
-        return replace(result, steps=np.array([100.0, 300.0]))
-
-    monkeypatch.setattr(RK4Method, "run", slow)
+    monkeypatch.setattr(RK4Method, "run", lambda *arguments: named.wait(10.0) and run(*arguments))
     said = []
     monkeypatch.setattr(cells.logger, "info", lambda text, *of: said.append(text % of) or named.set())
     given = load({"scene": SCENE, "solver": RK4, "sweep": {"grid": AXES | {"zone.half_angle": [0.1]}}})
-    cells.compute_task(given, Layout((2, 1)), np.arange(2))
+    for _ in range(2):
+        named.clear()
+        cells.compute_task(given, Layout((2, 1)), np.arange(2))
+    where = "not done after 0.001 s: drive.amplitude = 0.5 to 2, zone.half_angle = 0.1 (SI units); "
     # The first task may compile.
-    assert not any("took" in text for text in said)
-    assert "kernels are still compiled, or events" in said.pop(0)
-    named.clear()
-    cells.compute_task(given, Layout((2, 1)), np.arange(2))
-    where = "drive.amplitude = 0.5 to 2, zone.half_angle = 0.1 (SI units)"
-    assert said[0].startswith(f"not done after 0.001 s: {where}; events")
-    assert said[1].startswith("drive.amplitude = 2, zone.half_angle = 0.1 (SI units) took 3e+02 steps, ")
+    assert said[0].startswith(where + "kernels are still compiled, or events")
+    assert said[1].startswith(where + "events")

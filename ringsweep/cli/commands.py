@@ -192,11 +192,11 @@ def threshold_command(arguments: argparse.Namespace) -> None:
     ringsweep threshold my.yaml --path zone.half_angle --regime jammed --from "2 deg" --to "60 deg"
     ringsweep threshold my.yaml --path friction.rough.mu_k --regime separating --from 0.1 --to 0.5 --tolerance 1e-9
     """
-    from ringsweep.runs.thresholds import in_words, locate
+    from ringsweep.runs.thresholds import in_words, threshold
 
     asked = arguments.config, arguments.path, arguments.regime, (arguments.low, arguments.high), arguments.tolerance
-    options = {"scan": arguments.scan, "jobs": arguments.jobs, "unit": arguments.unit}
-    print(in_words(locate(*asked, settings=arguments.set, **options)))
+    options = {"set": arguments.set, "scan": arguments.scan, "jobs": arguments.jobs, "unit": arguments.unit}
+    print(in_words(threshold(*asked, **options)))
 
 
 def fit_command(arguments: argparse.Namespace) -> None:

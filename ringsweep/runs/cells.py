@@ -108,10 +108,8 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
                     for name, column in found.items():
                         columns.setdefault(name, _missing(name, len(positions), column))[cells] = column
     seconds = perf_counter() - start
-    # A compilation would count as time of the cells.
-    if not compiles and seconds >= LONG:
-        _name_longest(axes, indices, columns["steps"], seconds)
     _compiled.add(compiled)
+    # A compilation would count as time of the cells.
     return TaskResult(positions, columns, None if compiles else seconds, environment(), processor())
 
 
@@ -191,8 +189,13 @@ def _named_if_long(axes: Axes, indices: Indices, compiles: bool) -> Iterator[Non
     """Name the cells of a task, and say why one may be slow, if the block takes long."""
 
     def name() -> None:
-        message = "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps"
-        logger.info(message, LONG, _place(axes, indices), "kernels are still compiled, or " * compiles)
+        logger.info(
+            "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps: "
+            "solver.max_steps bounds them",
+            LONG,
+            _place(axes, indices),
+            "kernels are still compiled, or " * compiles,
+        )
 
     _watch_from(os.getpid())
     _under_way[get_ident()] = monotonic() + LONG, name
@@ -218,15 +221,6 @@ def _watch_from(process: int) -> None:
                     name()
 
     Thread(target=watch, daemon=True).start()
-
-
-def _name_longest(axes: Axes, indices: Indices, steps: NDArray[Any], seconds: float) -> None:
-    """Name the cell that took most of a long task, and say which limit of steps stands for a minute."""
-    longest = int(np.argmax(steps))
-    place = _place(axes, {dim: along[longest : longest + 1] for dim, along in indices.items()})
-    most, cost = float(steps[longest]), seconds / max(float(steps.sum()), 1.0)
-    message = "%s took %.2g steps, %.2g s; a run of %.2g steps takes a minute here: solver.max_steps bounds each"
-    logger.info(message, place, most, cost * most, 60.0 / cost)
 
 
 def _place(axes: Axes, indices: Indices) -> str:

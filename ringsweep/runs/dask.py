@@ -106,7 +106,7 @@ def _leave(farewell: Callable[[], Any]) -> None:
 
 
 class Workers:
-    """The workers of a scheduler: an :class:`ringsweep.runs.executors.Executor`."""
+    """The workers of a scheduler: they take tasks as :class:`ringsweep.runs.executors.Local` does."""
 
     def __init__(self, client: Client):
         self.client = client
@@ -125,7 +125,7 @@ class Workers:
         learn: Callable[[Result], Result],
         stopped: Event,
     ) -> Generator[Result]:
-        """Results in the order in which they are finished; see :class:`ringsweep.runs.executors.Executor`.
+        """Results in the order in which they are finished; see :class:`ringsweep.runs.executors.Local`.
 
         If a worker dies, its task goes to another worker. A task that kills several workers raises
         `distributed.KilledWorker`. (joblib's Dask backend would then wait for ever, and counts the workers only once.)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import resource_tracker
 from queue import SimpleQueue
-from typing import Any, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import joblib
 import numpy as np
@@ -25,6 +25,9 @@ from tqdm.auto import tqdm
 from ringsweep.errors import InputError
 from ringsweep.runs.needs import duration
 
+if TYPE_CHECKING:
+    from ringsweep.runs.dask import Workers
+
 logger = logging.getLogger("ringsweep")
 
 #: Seconds until the first line on the progress where there is no terminal.
@@ -34,36 +37,10 @@ Result = TypeVar("Result")
 Positions = NDArray[np.integer[Any]]
 
 
-class Executor(Protocol):
-    """Computes tasks; each task is given by the positions of its cells."""
-
-    def concurrency(self) -> int:
-        """Number of tasks that are computed at once, at this moment."""
-
-    def results(
-        self,
-        compute: Callable[[Positions], Result],
-        tasks: Iterator[Positions],
-        learn: Callable[[Result], Result],
-        stopped: threading.Event,
-    ) -> Generator[Result]:
-        """Results in the order in which they are finished. The next task is taken when a thread is free for it.
-
-        Parameters
-        ----------
-        compute : callable
-            Computes one task.
-        tasks : iterator of ndarray
-            Positions of the cells of each task.
-        learn : callable
-            Called with each result at once, before the next task is taken; returns the result.
-        stopped : Event
-            Once it is set, waiting for workers ends.
-        """
-
-
 class Local:
     """Workers of this machine by joblib: threads, or those that the user names with :func:`joblib.parallel_config`.
+
+    The workers of a Dask scheduler have the same methods.
 
     Parameters
     ----------
@@ -85,7 +62,7 @@ class Local:
             )
 
     def concurrency(self) -> int:
-        """Number of workers."""
+        """Number of tasks that are computed at once, at this moment."""
         return self._workers
 
     def results(
@@ -95,11 +72,22 @@ class Local:
         learn: Callable[[Result], Result],
         stopped: threading.Event,
     ) -> Generator[Result]:
-        """Results in the order in which they are finished; see :class:`Executor`.
+        """Results in the order in which they are finished. The next task is taken when a worker is free for it.
 
         The calling thread only waits: compilation and kernels would hold up its reaction to Ctrl-C. A task that fails
         stops the sweep after the tasks under way; its error is raised when their results are handed over. If Ctrl-C
         ends the wait, or is thrown into the generator, what is finished is still handed over.
+
+        Parameters
+        ----------
+        compute : callable
+            Computes one task.
+        tasks : iterator of ndarray
+            Positions of the cells of each task.
+        learn : callable
+            Called with each result at once, before the next task is taken; returns the result.
+        stopped : Event
+            Once it is set, no more tasks are taken.
         """
         found: SimpleQueue[Result | BaseException | None] = SimpleQueue()
         lock, working = threading.Lock(), self._workers
@@ -203,7 +191,7 @@ class Execution:
     scheduler: str | None = None
     progress: bool = True
 
-    def open(self) -> AbstractContextManager[Executor]:
+    def open(self) -> AbstractContextManager[Local | Workers]:
         """Workers of this machine, or those of the Dask scheduler.
 
         Raises

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from math import degrees, floor, log10
+from math import floor, log10
 from typing import Any
 
 import numpy as np
@@ -48,8 +48,10 @@ def threshold(
     between: Sequence[Any] | None = None,
     tolerance: Any = None,
     *,
+    set: Mapping[str, Any] | Iterable[str] = (),  # noqa: A002  as --set
     scan: int | None = None,
     jobs: int | None = None,
+    unit: str | None = None,
 ) -> xr.Dataset:
     """Values of one number of a scene at which a regime begins or ends.
 
@@ -70,10 +72,14 @@ def threshold(
         Ends of the interval; text may have a unit. By default those between which the configuration sweeps the path.
     tolerance : float or str, optional
         Largest error, in the unit of the path; by default a millionth of the greatest value.
+    set : mapping of str to number or str, optional
+        Values that replace those of the scene, by path, as for :func:`ringsweep.simulate`.
     scan : int, optional
         Number of runs between the ends, both included; 128 by default. Two changes between two of them are missed.
     jobs : int, optional
         Number of threads; all cores by default.
+    unit : str, optional
+        Unit of the answer in words; by default that of the ends, or else that of the number in the configuration.
 
     Returns
     -------
@@ -106,33 +112,7 @@ def threshold(
     """
     if isinstance(config, Mapping) and "scene" not in config:
         config = {"scene": config}
-    return locate(config, path, regime, between, tolerance, scan=scan, jobs=jobs)
-
-
-def locate(
-    config: str | os.PathLike[str] | Mapping[str, Any],
-    path: str,
-    regime: str,
-    between: Any,
-    tolerance: Any,
-    *,
-    scan: int | None = None,
-    settings: Iterable[str] = (),
-    jobs: int | None = None,
-    unit: str | None = None,
-) -> xr.Dataset:
-    """Thresholds of a configuration in which some values are changed; see :func:`threshold`.
-
-    Parameters
-    ----------
-    between : tuple
-        An end that is None is that of the sweep.
-    settings : iterable of str
-        As for :func:`ringsweep.config.with_values`.
-    unit : str, optional
-        Unit of the answer in words; by default that of the ends, or else that of the number in the configuration.
-    """
-    settings = list(settings)
+    settings: list[Any] = list(set.items() if isinstance(set, Mapping) else set)
     whole = load(config, _beside_axes(config, path, settings))
     path = as_named(path, whole.scene.structure.elsewhere)
     sampled = () if whole.sample is None else (one for factor in whole.sample.factors for one in factor.paths)
@@ -297,16 +277,18 @@ def interval(whole: Config, path: str, between: Any, *forms: tuple[str, str]) ->
     return ends[0], ends[1]
 
 
-def _beside_axes(config: Any, path: str, settings: list[str]) -> list[str]:
+def _beside_axes(config: Any, path: str, settings: list[Any]) -> list[Any]:
     """Settings without those of axes other than `path`: what is swept beside it has one value here, which they give."""
     doc = yaml_text.read(config)
     with doc.locating_errors():
         sweep = sweep_section(doc)
     others = set() if "sample" in sweep else set(swept_paths(sweep)) - {path.removeprefix("scene.")}
-    return [one for one in settings if one.partition("=")[0].strip().removeprefix("scene.") not in others]
+    paths = (one.partition("=")[0].strip() if isinstance(one, str) else one[0] for one in settings)
+    known = zip(settings, paths, strict=True)
+    return [one for one, given in known if given.removeprefix("scene.") not in others]
 
 
-def _single_run(config: Any, path: str, between: Any, settings: list[str]) -> tuple[Config, float, float]:
+def _single_run(config: Any, path: str, between: Any, settings: list[Any]) -> tuple[Config, float, float]:
     """Configuration of a single run, and the ends of the interval in SI units."""
     low, high = interval(load(config, _beside_axes(config, path, settings)), path, between)
     try:
@@ -330,9 +312,8 @@ def _scanned(runs: xr.Dataset, axis: xr.DataArray, label: str) -> str:
 
 
 def _number(value: float, axis: xr.DataArray) -> str:
-    """A number with its unit; an angle in degrees too."""
-    turned = f" ({degrees(value):.6g} deg)" if axis.attrs.get("units") == "rad" else ""
-    return f"{value:.6g}{_unit(axis)}{turned}"
+    """A number with its unit."""
+    return f"{value:.6g}{_unit(axis)}"
 
 
 def _unit(data: xr.DataArray) -> str:
@@ -348,11 +329,12 @@ def _with_error(value: float, error: float) -> str:
 def in_words(found: xr.Dataset) -> str:
     """What :func:`threshold` found, a line for each threshold."""
     path, regime = found.attrs["threshold_path"], found.attrs["boundary_of"]
+    unit = found.attrs.get("threshold_unit", "")
     if "quantile" in found.dims:
         return "\n".join(
-            [f"{regime} begins at {path}, by its probability (95 % interval):", *_quantiles_in_words(found)]
+            [f"{regime} begins at {path}, by its probability (95 % interval):", *_quantiles_in_words(found, unit)]
         )
-    axis, unit = found[dimension(path)], found.attrs.get("threshold_unit", "")
+    axis = found[dimension(path)]
     allowed = in_unit(found["error"].assign_attrs(units=axis.attrs.get("units", "1")), unit)
     axis = in_unit(axis, unit)
     lines = []
@@ -360,27 +342,18 @@ def in_words(found: xr.Dataset) -> str:
         axis.values, allowed.values, found["begins"].values, words(found["beyond"]).values, strict=True
     ):
         does, side = ("begins", "below") if begins else ("ends", "above")
-        at = f"{path} = {_with_error(value, error)}{_unit(axis)}"
-        if axis.attrs.get("units") == "rad":
-            at += f" ({_with_error(degrees(value), degrees(error))} deg)"
-        lines.append(f"{regime} {does} at {at}; {side}: {beyond}")
+        lines.append(f"{regime} {does} at {path} = {_with_error(value, error)}{_unit(axis)}; {side}: {beyond}")
     if not lines:
         lines.append(f"{regime} neither begins nor ends there")
     return "\n".join([*lines, f"scan: {found.attrs['scan']}; {_MISSED}"])
 
 
-def _quantiles_in_words(found: xr.Dataset) -> list[str]:
-    unit = found.attrs.get("threshold_unit", "") or found["threshold"].attrs.get("units", "1")
+def _quantiles_in_words(found: xr.Dataset, unit: str) -> list[str]:
+    si = found["threshold"].attrs.get("units", "1")
+    ends = [in_unit(found[f"threshold_quantile{end}"].assign_attrs(units=si), unit) for end in ("", "_low", "_high")]
     lines = []
-    for level in found["quantile"].values:
-        one = found.sel(quantile=level)
-        ends = (one[f"threshold_quantile{end}"] for end in ("", "_low", "_high"))
-        si = found["threshold"].attrs.get("units", "1")
-        value, low, high = (in_unit(end.assign_attrs(units=si), unit).item() for end in ends)
-        shown = f"{value:.6g}{after_number(unit)} ({low:.6g} to {high:.6g})"
-        if unit == "rad":
-            shown += f", {degrees(value):.6g} deg ({degrees(low):.6g} to {degrees(high):.6g})"
-        lines.append(f"  {level:.0%} below {shown}")
+    for level, value, low, high in zip(found["quantile"].values, *(end.values for end in ends), strict=True):
+        lines.append(f"  {level:.0%} below {_number(value, ends[0])} ({low:.6g} to {high:.6g})")
     values = found["threshold"].values
     counts = {
         "begin at the first value or before": np.count_nonzero(np.isneginf(values)),
