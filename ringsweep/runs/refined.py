@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config import Config
 from ringsweep.config.refine import Refinement
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED, LABELS, MISSING, OUTCOMES
@@ -28,47 +27,6 @@ SEED = 18
 _FLAGS = 13
 
 
-class KnownLabels:
-    """Labels of the cells that are known, by position in the layout.
-
-    Attributes
-    ----------
-    known : ndarray of bool, shape ``(cells,)``
-    """
-
-    def __init__(self, config: Config, total: int):
-        assert config.refine is not None
-        self.also = config.refine.also
-        # Without certificates no cell is certified, and that says nothing.
-        self.asks_certificate = config.certifies
-        self.known = np.zeros(total, dtype=bool)
-        self._labels = np.zeros(total, dtype=np.int16)
-        self._certain = np.zeros(total, dtype=bool)
-        self._values = None if self.also is None else np.full(total, np.nan)
-
-    @property
-    def names(self) -> list[str]:
-        """Columns that are needed."""
-        return [*LABELS, "certified", *([] if self.also is None else [self.also])]
-
-    def put(self, positions: NDArray[np.integer], columns: Columns) -> None:
-        """Add cells that have been run."""
-        labels = np.zeros(len(positions), dtype=np.int16)
-        for k, name in enumerate(LABELS):
-            if name in columns:
-                labels += columns[name].astype(np.int16) * np.int16(_FLAGS**k)
-        self._labels[positions] = labels
-        self._certain[positions] = (columns["certified"] == 1) if self.asks_certificate else True
-        if self._values is not None:
-            self._values[positions] = columns[str(self.also)]
-        self.known[positions] = True
-
-    def at(self, positions: NDArray[np.integer]) -> Answer:
-        """Labels of known cells."""
-        values = None if self._values is None else self._values[positions]
-        return Answer(self._labels[positions], self._certain[positions], values)
-
-
 class Refined(Grid):
     """Plan of a sweep of which only the boundaries of the map are run."""
 
@@ -81,32 +39,51 @@ class Refined(Grid):
 
     def compute(self, work: Work) -> None:
         """Compute the cells that decisions ask for."""
-        labels = KnownLabels(self.config, self.layout.total)
+        total, also = self.layout.total, self.asked.also
+        known, certain = np.zeros((2, total), dtype=bool)
+        labels = np.zeros(total, dtype=np.int16)
+        values = None if also is None else np.full(total, np.nan)
+
+        def put(positions: NDArray[np.integer], columns: Columns) -> None:
+            labels[positions] = 0
+            for k, name in enumerate(LABELS):
+                if name in columns:
+                    labels[positions] += columns[name].astype(np.int16) * np.int16(_FLAGS**k)
+            # Without certificates no cell is certified, and that says nothing.
+            certain[positions] = (columns["certified"] == 1) | (not self.config.certifies)
+            if values is not None:
+                values[positions] = columns[also]
+            known[positions] = True
+
         for positions, columns in work.store.finished():
-            labels.put(positions, dict(columns))
+            put(positions, dict(columns))
         # Which cells an earlier sweep must give is known at the end: until then its labels are enough.
         if self.earlier is not None:
-            for positions, columns in self.earlier.shared_cells(self.config, self.layout, labels.known, labels.names):
-                labels.put(positions, columns)
-        work.notice = labels.put
+            names = [*LABELS, "certified", also]
+            for positions, columns in self.earlier.shared_cells(self.config, self.layout, known, names):
+                put(positions, columns)
+        work.notice = put
 
-        def run(cells: NDArray[np.intp]) -> None:
-            work.run(cells[:, None])
-            if not labels.known[cells].all():
-                raise KeyboardInterrupt
+        def answer(positions: NDArray[np.intp]) -> Answer:
+            missing = np.sort(positions[~known[positions]])
+            if len(missing):
+                work.run(missing[:, None])
+                if not known[missing].all():
+                    raise KeyboardInterrupt
+            return Answer(labels[positions], certain[positions], None if values is None else values[positions])
 
         with work.begun(None):
-            self._decided = self._decide(labels, run)
+            self._decided = self._decide(answer)
         if self.earlier is not None:
-            needed = np.zeros(self.layout.total, dtype=bool)
+            needed = np.zeros(total, dtype=bool)
             needed[self.layout.positions(np.nonzero(self._decided.origin != INFERRED))] = True
             work.take_shared(work.store.done | ~needed)
 
-    def _decide(self, labels: KnownLabels, run: Callable[[NDArray[np.intp]], None]) -> Decided:
+    def _decide(self, answer: Callable[[NDArray[np.intp]], Answer]) -> Decided:
         """Run the cells of a refined sweep, round after round; arrays of the result have the shape of the grid.
 
-        Decisions follow from labels alone, so a sweep that was stopped takes the same decisions again. `run` runs the
-        cells at some positions, which ascend, and adds them to the labels.
+        Decisions follow from labels alone, so a sweep that was stopped takes the same decisions again. `answer` runs
+        the cells at some positions.
         """
         asked, sizes = self.asked, self.config.axes.sizes
         dims = [*(dim for dim in sizes if dim not in asked.dims), *asked.dims]
@@ -115,19 +92,13 @@ class Refined(Grid):
         layers = math.prod(grid[: len(grid) - len(asked.dims)])
         decisions = refine((layers, rows, columns), asked.stride, asked.audit, within=asked.within, seed=SEED)
         order = [dims.index(dim) for dim in sizes]
-        answer = None
-        while True:
-            try:
-                cells = next(decisions) if answer is None else decisions.send(answer)
-            except StopIteration as end:
-                found = end.value
-                break
-            indices = np.unravel_index(cells, grid)
-            positions = self.layout.positions([indices[k] for k in order])
-            missing = np.sort(positions[~labels.known[positions]])
-            if len(missing):
-                run(missing)
-            answer = labels.at(positions)
+        try:
+            cells = next(decisions)
+            while True:
+                indices = np.unravel_index(cells, grid)
+                cells = decisions.send(answer(self.layout.positions([indices[k] for k in order])))
+        except StopIteration as end:
+            found = end.value
 
         def in_grid(array: NDArray[Any]) -> NDArray[Any]:
             return array.reshape(grid).transpose(order)

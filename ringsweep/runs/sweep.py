@@ -309,21 +309,19 @@ def _compute_file(work: Work, target: Path, checkpoint: Checkpoint) -> None:
     check_room(plan, (plan.layout.total - finished) // plan.parts_of_cell, target.parent)
     if finished:
         logger.info("going on: %d of %d %s are done", finished, plan.layout.total, plan.parts)
-    try:
-        _write_file(work, target, checkpoint)
-    except DamagedTask as damage:
-        logger.warning("%s: the missing cells are computed again", damage)
-        checkpoint.scan()
-        _write_file(work, target, checkpoint)
-
-
-def _write_file(work: Work, target: Path, checkpoint: Checkpoint) -> None:
-    plan = work.plan
-    plan.compute(work)
-    frame = xr.Dataset(coords=plan.coordinates(), attrs=plan.attributes())
-    frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
-    destination = target, checkpoint.working_folder, frame, plan.variables(), plan.grid
-    netcdf.write(*destination, plan.chunks(checkpoint), plan.gaps)
+    for is_last in (False, True):
+        try:
+            plan.compute(work)
+            frame = xr.Dataset(coords=plan.coordinates(), attrs=plan.attributes())
+            frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
+            destination = target, checkpoint.working_folder, frame, plan.variables(), plan.grid
+            netcdf.write(*destination, plan.chunks(checkpoint), plan.gaps)
+            return
+        except DamagedTask as damage:
+            if is_last:
+                raise
+            logger.warning("%s: the missing cells are computed again", damage)
+            checkpoint.scan()
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
@@ -373,10 +371,8 @@ class MemoryStore:
         self.columns: dict[str, NDArray[Any]] = {}
 
     def finished(self) -> Iterator[tuple[NDArray[np.intp], Columns]]:
-        """Positions and columns of finished cells."""
-        positions = np.flatnonzero(self.done)
-        if len(positions):
-            yield positions, {name: column[positions] for name, column in self.columns.items()}
+        """Positions and columns of cells that an earlier call has finished: there are none."""
+        return iter(())
 
     def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
         """Store the columns of the cells at these positions."""

@@ -123,11 +123,18 @@ def threshold(
         unit = common_unit(given) or written_unit(whole.source, path)
     else:
         quantity(f"1 {unit}", Parameter(sweepable(whole.scene)[path].attributes["units"], path), "unit")
+    values, allowed = _scan(whole, path, ends, tolerance, scan)
     if whole.sample is not None:
-        found = distribution(whole, path, regime, *_scan(whole, path, ends, tolerance, scan), jobs=jobs)
+        found = distribution(whole, path, regime, values, allowed, jobs=jobs)
         return found.assign_attrs(threshold_unit=unit)
-    one, low, high = _single_run(config, path, between, settings)
-    values, allowed = _scan(one, path, (low, high), tolerance, scan)
+    try:
+        one = with_values(config, [*settings, (path, ends[0])])
+    except InputError as error:
+        if error.problem.startswith("missing"):
+            raise
+        raise InputError("from", f"{path} = {ends[0]:g} is not allowed: {error.path}: {error.problem}") from None
+    if one.axes.sizes:
+        raise InputError("sweep", "several friction laws, but a threshold is that of one: --set friction.law=...")
     scanned = load(dict(one.source) | {"sweep": {"grid": {path: values.tolist()}}})
     runs = compute(scanned, Execution(jobs, progress=False))
     name = dimension(path)
@@ -286,20 +293,6 @@ def _beside_axes(config: Any, path: str, settings: list[Any]) -> list[Any]:
     paths = (one.partition("=")[0].strip() if isinstance(one, str) else one[0] for one in settings)
     known = zip(settings, paths, strict=True)
     return [one for one, given in known if given.removeprefix("scene.") not in others]
-
-
-def _single_run(config: Any, path: str, between: Any, settings: list[Any]) -> tuple[Config, float, float]:
-    """Configuration of a single run, and the ends of the interval in SI units."""
-    low, high = interval(load(config, _beside_axes(config, path, settings)), path, between)
-    try:
-        one = with_values(config, [*settings, (path, low)])
-    except InputError as error:
-        if error.problem.startswith("missing"):
-            raise
-        raise InputError("from", f"{path} = {low:g} is not allowed: {error.path}: {error.problem}") from None
-    if one.axes.sizes:
-        raise InputError("sweep", "several friction laws, but a threshold is that of one: --set friction.law=...")
-    return one, low, high
 
 
 def _scanned(runs: xr.Dataset, axis: xr.DataArray, label: str) -> str:
