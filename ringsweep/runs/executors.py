@@ -90,47 +90,36 @@ class Local:
             Once it is set, no more tasks are taken.
         """
         found: SimpleQueue[Result | BaseException | None] = SimpleQueue()
-        lock, working = threading.Lock(), self._workers
-        parallel = joblib.Parallel(self._jobs, return_as="generator_unordered", prefer="threads", batch_size=1)
+        lock, threads = threading.Lock(), self._workers if self._shared else 1
+        parallel: Any = nullcontext()
+        if not self._shared:
+            parallel = joblib.Parallel(self._jobs, return_as="generator_unordered", batch_size=1)
 
-        def finish(outcome: Result | BaseException) -> None:
-            if isinstance(outcome, BaseException):
-                stopped.set()
-            else:
-                with lock:
-                    learn(outcome)
-            found.put(outcome)
-
-        def work_here() -> None:
-            nonlocal working
+        def outcomes() -> Iterator[Result | BaseException]:
+            if not self._shared:
+                _shield_from_interrupts()
+                # The first task runs alone: the other processes find its kernels compiled.
+                for some in (islice(tasks, self._alone), tasks):
+                    yield from parallel(joblib.delayed(_attempt)(compute, task) for task in some)
+                self._alone = 0
+                return
+            # A call of joblib for each task would cost a millisecond.
             while not stopped.is_set():
                 with lock:
                     task = next(tasks, None)
                 if task is None:
-                    break
-                finish(_attempt(compute, task))
-            with lock:
-                working -= 1
-            # joblib would poll for the end of its calls, 10 ms for each round of a refined sweep.
-            if not working:
-                found.put(None)
+                    return
+                yield _attempt(compute, task)
 
         def work() -> None:
             try:
-                if self._workers == 1:
-                    work_here()
-                    return
-                if self._shared:
-                    # One call for each thread, which takes task after task: a call of joblib costs a millisecond.
-                    for _ in parallel(joblib.delayed(work_here)() for _ in range(self._workers)):
-                        pass
-                    return
-                _shield_from_interrupts()
-                # The first task runs alone: the other processes find its kernels compiled.
-                for some in (islice(tasks, self._alone), tasks):
-                    for outcome in parallel(joblib.delayed(_attempt)(compute, task) for task in some):
-                        finish(outcome)
-                self._alone = 0
+                for outcome in outcomes():
+                    if isinstance(outcome, BaseException):
+                        stopped.set()
+                    else:
+                        with lock:
+                            learn(outcome)
+                    found.put(outcome)
             except BaseException as error:
                 # Once the sweep is to stop, it is no news that workers ended with their tasks.
                 if not stopped.is_set():
@@ -139,13 +128,16 @@ class Local:
 
         failure = None
         # Its exit kills processes that still have tasks.
-        with nullcontext() if self._shared else parallel:
-            # A daemon, as joblib's threads are, so that a second Ctrl-C need not wait for their tasks.
-            threading.Thread(target=work, daemon=True).start()
+        with parallel:
+            for _ in range(threads):
+                # Daemons, so that a second Ctrl-C need not wait for their tasks.
+                threading.Thread(target=work, daemon=True).start()
             try:
-                while (item := found.get()) is not None:
-                    if isinstance(item, BaseException):
+                while threads:
+                    if isinstance(item := found.get(), BaseException):
                         failure = failure or item
+                    elif item is None:
+                        threads -= 1
                     else:
                         yield item
             except KeyboardInterrupt:
