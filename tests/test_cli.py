@@ -332,7 +332,7 @@ def test_plot_draws_what_simulate_and_precision_wrote_and_names_the_command_for_
     )
     assert main(["plot", "work.nc"]) == 0
     assert "wrote work.png" in capsys.readouterr().out
-    assert "are for histories" in refused(capsys, "plot", "work.nc", "--kind", "phase")
+    assert "--kind phase: is not for errors against run time" in refused(capsys, "plot", "work.nc", "--kind", "phase")
 
 
 @pytest.mark.parametrize(

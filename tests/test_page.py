@@ -254,7 +254,7 @@ def test_map_writes_a_page_and_refuses_boundaries_in_it(bokeh, tmp_path, monkeyp
     assert "wrote my.html" in capsys.readouterr().out
     assert models((tmp_path / "my.html").read_text(encoding="utf-8"), "Select")[0]["value"] == "phi_max"
     assert cli.main(["map", "my.nc", "-o", "my.html", "--boundaries", "separating"]) == 2
-    assert "not into a page" in capsys.readouterr().err
+    assert "not for a page" in capsys.readouterr().err
 
 
 def test_zeros_among_numbers_over_decades_have_a_colour_of_their_own_and_the_least_number_has_not(bokeh, tmp_path):

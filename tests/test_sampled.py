@@ -472,7 +472,7 @@ def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatc
     for arguments, words in (
         (["map", "my.nc", "-o", "my.html"], "no runs to point at"),
         (["plot", "my.nc", "--kind", "survival"], "has several cells: hold belt_velocity (4), time_span (4)"),
-        (["plot", "my.nc", "--kind", "phase"], "is for histories"),
+        (["plot", "my.nc", "--kind", "phase"], "--kind phase: is not for a sampled sweep"),
         (["plot", "my.nc", "--word", "riding"], "--kind sensitivity"),
         (["map", "my.nc", "--sel", "word=ridin"], "did you mean riding?"),
         (["run", "my.yaml", "--refine"], "cannot stand beside sweep.sample"),

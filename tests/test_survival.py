@@ -424,14 +424,14 @@ class TestFullDisk:
 
     def test_file_that_does_not_read_back_is_removed(self, config, tmp_path, monkeypatch, capsys):
         target = tmp_path / "out.nc"
-        write = netcdf._write_chunks
+        seal = netcdf._seal
 
-        def faulty(file, *others):
-            digests = write(file, *others)
-            file["phi_max"][:] = 0.0
-            return digests
+        def faulty(path, *others):
+            with netCDF4.Dataset(path, "a") as file:
+                file["phi_max"][:] = 0.0
+            seal(path, *others)
 
-        monkeypatch.setattr(netcdf, "_write_chunks", faulty)
+        monkeypatch.setattr(netcdf, "_seal", faulty)
         assert cli.main(["run", str(config), "-o", str(target)]) == 1
         assert "does not read back" in capsys.readouterr().err
         assert left(target) == ["out.nc.partial"]

@@ -18,8 +18,6 @@ from ringsweep.plots.sections import points_of
 from ringsweep.plots.selection import select, select_grid
 from ringsweep.storage import files, netcdf
 
-_SAMPLE_KINDS = ("probability", "survival", "sensitivity")
-
 
 def draw_stored(arguments: argparse.Namespace, draw: Callable[[argparse.Namespace, Path, Any], None]) -> None:
     """Draw a file, which errors about a dataset name."""
@@ -50,10 +48,9 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     shown = None if arguments.var == "regime" else arguments.var
     target = _picture_of(dataset, arguments.output, shown, *map(_name_part, arguments.sel))
     page = target.suffix.lower() == ".html"
-    if page and arguments.log:
-        raise InputError("--log", "is for pictures, not for a page: name the output *.png")
-    if page and arguments.boundaries is not None:
-        raise InputError("--boundaries", "are drawn into pictures, not into a page: name the output *.png")
+    for option, given in (("--log", arguments.log), ("--boundaries", arguments.boundaries)):
+        if page and given:
+            raise InputError(option, "is for pictures, not for a page: name the output *.png")
     if arguments.tolerance is not None and arguments.boundaries is None:
         raise InputError("--tolerance", "is that of --boundaries REGIME")
     curves = None
@@ -100,64 +97,60 @@ def _name_part(held: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "-", held.replace(" ", "").replace("+", ""))
 
 
+#: Options of `plot` that are not for all files.
+_OPTIONS = {"kind": "--kind", "sel": "--sel", "word": "--word", "law": "--law", "begin": "--from", "end": "--to"}
+
+#: The options that each kind of file takes, with the values of those that have few.
+_TAKES: dict[str, dict[str, tuple[str, ...]]] = {
+    "residual": {},
+    "contender": {},
+    "probability": {"kind": ("probability", "survival", "sensitivity"), "sel": (), "word": ()},
+    "time": {"kind": ("phase", "friction"), "law": (), "begin": (), "end": ()},
+}
+
+
 def draw_plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     """Draw the history of a run, errors against run time, a fit, or a sampled sweep."""
-    if "residual" in result:
-        given = (arguments.kind, arguments.law, arguments.word, arguments.begin, arguments.end)
-        if arguments.sel or any(option is not None for option in given):
-            raise InputError(str(dataset), "is a fit, of which there is one picture: leave other options out")
-        save(plots.fit(result), Path(arguments.output or dataset.with_suffix(".png")))
-        return
-    if is_sampled(result):
-        _plot_sample(arguments, dataset, result)
-        return
-    if arguments.sel or arguments.word is not None or arguments.kind in _SAMPLE_KINDS:
-        option = "--sel" if arguments.sel else "--word" if arguments.word is not None else f"--kind {arguments.kind}"
-        raise InputError(option, f"is for a sampled sweep, and {dataset} is none")
-    if not {"time", "contender"} & set(result.dims):
+    mark, kind = netcdf.kind_of(result), arguments.kind
+    if mark not in _TAKES:
         raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
-    target = _picture_of(dataset, arguments.output, arguments.kind, arguments.law)
-    cut = slice(arguments.begin, arguments.end)
-    if "contender" in result.dims and (arguments.kind or arguments.law or cut != slice(None)):
-        raise InputError(str(dataset), "holds errors against run time: --kind, --law, --from, --to are for histories")
+    for name, option in _OPTIONS.items():
+        given, values = getattr(arguments, name), _TAKES[mark].get(name)
+        if given not in (None, []) and (values is None or (values and given not in values)):
+            called = f"--kind {kind}" if name == "kind" else option
+            raise InputError(called, f"is not for {netcdf.KINDS[mark]}, which is in {dataset}")
+    if arguments.word is not None and kind != "sensitivity":
+        raise InputError("--word", "is that of --kind sensitivity")
+    target = _picture_of(dataset, arguments.output, kind, arguments.law, *map(_name_part, arguments.sel))
+    if mark == "residual":
+        save(plots.fit(result), target)
+    elif mark == "contender":
+        save(plots.work_precision(result), target)
+    elif mark == "probability":
+        selection = dict(_selection(text) for text in arguments.sel)
+        if kind in (None, "probability"):
+            save(plots.regime_map(result, sel=selection), target)
+        else:
+            options = {"word": arguments.word} if arguments.word else {}
+            save(panel(getattr(plots, f"{kind}_panel"), select(result, selection)[0], **options), target)
+    else:
+        part = _part_of(result, arguments, dataset)
+        portrait = plots.phase_portrait if kind == "phase" else plots.friction_loop
+        save(panel(portrait, part, 4.8) if kind else plots.history(part), target)
+
+
+def _part_of(result: Any, arguments: argparse.Namespace, dataset: Path) -> Any:
+    """The run of a history under the law that is asked for, between the times that are asked for."""
     if arguments.law is not None:
         if "friction_law" not in result.dims:
             raise InputError("--law", f"{dataset} holds a run under one friction law only")
         laws = map(str, result["friction_law"].values)
         result = result.sel(friction_law=resolve("--law", arguments.law, laws))
-    if cut != slice(None):
-        times = result["time"].values
-        result = result.sel(time=cut)
-        if result.sizes["time"] < 2:
-            raise InputError(
-                "--from", f"{dataset} has times from {times[0]:g} to {times[-1]:g} s: none in this interval"
-            )
-    if "contender" in result.dims:
-        figure = plots.work_precision(result)
-    elif arguments.kind is None:
-        figure = plots.history(result)
-    else:
-        figure = panel(plots.phase_portrait if arguments.kind == "phase" else plots.friction_loop, result, 4.8)
-    save(figure, target)
-
-
-def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
-    """Draw a sampled sweep, or one cell of it."""
-    if arguments.law is not None or arguments.begin is not None or arguments.end is not None:
-        raise InputError(str(dataset), "is a sampled sweep: --law, --from, --to are for histories")
-    if arguments.kind not in (None, *_SAMPLE_KINDS):
-        raise InputError("--kind", f"{arguments.kind} is for histories; of {dataset}: {', '.join(_SAMPLE_KINDS)}")
-    kind = arguments.kind or "probability"
-    if arguments.word is not None and kind != "sensitivity":
-        raise InputError("--word", "is that of --kind sensitivity")
-    target = _picture_of(dataset, arguments.output, arguments.kind, *map(_name_part, arguments.sel))
-    selection = dict(_selection(text) for text in arguments.sel)
-    if kind == "probability":
-        save(plots.regime_map(result, sel=selection), target)
-        return
-    draw = getattr(plots, f"{kind}_panel")
-    options = {"word": arguments.word} if arguments.word else {}
-    save(panel(draw, select(result, selection)[0], **options), target)
+    part = result.sel(time=slice(arguments.begin, arguments.end))
+    if part.sizes["time"] < min(2, result.sizes["time"]):
+        first, last = result["time"].values[[0, -1]]
+        raise InputError("--from", f"{dataset} has times from {first:g} to {last:g} s: none in this interval")
+    return part
 
 
 def _picture_of(dataset: Path, output: str | None, *parts: str | None) -> Path:

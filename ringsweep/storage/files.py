@@ -262,22 +262,32 @@ class WorkingFolder:
         except OSError:
             return []
 
-    def write(self, name: str, content: bytes) -> None:
-        """Write a file so that it is on the disk, completely or not at all."""
-        temporary = self.temporary()
+    @contextmanager
+    def replacing(self, target: Path) -> Iterator[Path]:
+        """Give a temporary name. At the end of the block the file of that name takes the place of `target`.
+
+        It gets the permissions of `target`, and no power cut can undo it. If the block fails, it is removed.
+        """
+        temporary = self.temporary(target.suffix)
         try:
-            with temporary.open("xb") as file:
-                file.write(content)
-                file.flush()
+            yield temporary
+            with temporary.open("r+b") as file:
                 os.fsync(file.fileno())
-            temporary.replace(self.path / name)
-            # Without this a power cut can undo the renaming.
-            flush_folder(self.path)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(self.path)) from error
+            with suppress(FileNotFoundError):
+                temporary.chmod(_permissions(target))
+            temporary.replace(target)
+            flush_folder(target.parent)
         finally:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file in the folder so that it is on the disk, completely or not at all."""
+        try:
+            with self.replacing(self.path / name) as temporary:
+                temporary.write_bytes(content)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from error
 
 
 @contextmanager
@@ -304,20 +314,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     check_writable(path)
     target = Path(path).resolve()
-    with working_folder(target, _PATIENCE) as folder:
-        temporary = folder.temporary(target.suffix)
+    with working_folder(target, _PATIENCE) as folder, folder.replacing(target) as temporary:
         yield temporary
-        put_in_place(temporary, target)
-
-
-def put_in_place(temporary: Path, target: Path) -> None:
-    """Let a complete file take the place of `target`, whose permissions it gets, so that no power cut can undo it."""
-    with temporary.open("r+b") as file:
-        os.fsync(file.fileno())
-    with suppress(FileNotFoundError):
-        temporary.chmod(_permissions(target))
-    temporary.replace(target)
-    flush_folder(target.parent)
 
 
 def flush_folder(folder: Path) -> None:

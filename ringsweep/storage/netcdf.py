@@ -8,7 +8,7 @@ import math
 import os
 import stat
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -23,7 +23,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities import trailer
 from ringsweep.quantities.variables import MISSING, OUTCOMES, Variable, error_attribute, meanings_of
 from ringsweep.storage.chunks import Layout
-from ringsweep.storage.files import WorkingFolder, check_name, put_in_place, replacing
+from ringsweep.storage.files import WorkingFolder, check_name, replacing
 
 #: Attributes that every file of this package has.
 SIGNATURE = ("Conventions", "ringsweep_version")
@@ -53,10 +53,8 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     OSError
         If writing fails, or the file differs from the dataset when it is read back.
     """
-    with replacing(path) as temporary, _naming_the_cause(Path(path)):
-        with _created(temporary) as file:
-            _add(ds, file)
-        _seal(temporary, ds)
+    with replacing(path) as temporary:
+        _write(temporary, Path(path), ds)
 
 
 def write(
@@ -92,23 +90,34 @@ def write(
     OSError
         If writing fails, or the file differs from the dataset when it is read back.
     """
-    temporary = folder.temporary()
-    try:
-        with _naming_the_cause(target):
-            with _created(temporary) as file:
-                _add(frame, file)
-                written = _write_chunks(file, frame, variables, layout, chunks, gaps)
-            _seal(temporary, frame, written, layout)
-            put_in_place(temporary, target)
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+    with folder.replacing(target) as temporary:
+        _write(temporary, target, frame, variables, layout, chunks, gaps)
 
 
-@contextmanager
-def _naming_the_cause(target: Path) -> Iterator[None]:
+def _write(
+    path: Path,
+    target: Path,
+    frame: xr.Dataset,
+    variables: Mapping[str, Variable] = MappingProxyType({}),
+    layout: Layout | None = None,
+    chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]] = (),
+    gaps: Collection[str] = (),
+) -> None:
+    """Write a dataset, then columns chunk by chunk, and seal the file if it reads back as it was written."""
+    digest, names = hashlib.blake2b(), list[str]()
     try:
-        yield
+        with _small_caches(), _created(path) as file:
+            _add(frame, file)
+            for data in frame.variables.values():
+                _add_values(digest, data.values)
+            for region, columns in chunks:
+                if layout is not None and not names:
+                    names = list(columns)
+                    _declare(file, frame, variables, layout, columns, gaps)
+                for name in names:
+                    file[name][(*region, ...)] = columns[name]
+                    _add_values(digest, columns[name])
+        _seal(path, frame, names, layout, digest.digest())
     except (OSError, RuntimeError) as error:
         # If the disk is full, the NetCDF library only reports "HDF error".
         raise OSError(f"{target} could not be written ({error}); is the disk full, or faulty?") from error
@@ -127,48 +136,25 @@ def _created(path: Path) -> Iterator[Any]:
         raise
 
 
-def _seal(
-    path: Path, frame: xr.Dataset, written: Mapping[str, Any] = MappingProxyType({}), layout: Layout | None = None
-) -> None:
-    """Seal a complete file, if it reads back as it was written.
-
-    Parameters
-    ----------
-    path : Path
-    frame : xarray.Dataset
-        What was written whole.
-    written : mapping
-        Digests of the columns that were written chunk by chunk.
-    layout : Layout, optional
-        Their chunks.
-    """
-    with netCDF4.Dataset(path) as file:
-        file.set_auto_maskandscale(False)
-        for name, data in frame.variables.items():
-            _compare(file[str(name)], _add_values(_new_digest(), data.values), [()])
-        for name, digest in written.items():
-            assert layout is not None
-            _cache_one_chunk(file[name])
-            _compare(file[name], digest, (region for _, _, region in layout.chunks()))
-    trailer.seal(path)
-
-
-def _compare(variable: Any, digest: Any, regions: Iterable[tuple[slice, ...]]) -> None:
-    again = _new_digest()
-    for region in regions:
-        _add_values(again, variable[(*region, ...)])
-    if again.digest() != digest.digest():
-        raise OSError("the file does not read back as it was written")
-
-
-def _new_digest() -> Any:
-    return hashlib.blake2b(digest_size=16)
-
-
-def _add_values(digest: Any, values: NDArray[Any]) -> Any:
+def _add_values(digest: Any, values: Any) -> None:
     array = np.asarray(values)
-    digest.update(json.dumps(array.tolist()).encode() if array.dtype.kind in "OU" else np.ascontiguousarray(array).data)
-    return digest
+    text = array.dtype.kind in "OU"
+    digest.update(json.dumps(array.tolist()).encode() if text else np.ascontiguousarray(array).data)
+
+
+def _seal(path: Path, frame: xr.Dataset, names: Iterable[str], layout: Layout | None, written: bytes) -> None:
+    """Seal a complete file, if all numbers and texts in it are those written, in their order."""
+    again = hashlib.blake2b()
+    with _small_caches(), netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        for name in frame.variables:
+            _add_values(again, file[str(name)][...])
+        for _, _, region in layout.chunks() if layout is not None else ():
+            for name in names:
+                _add_values(again, file[name][(*region, ...)])
+    if again.digest() != written:
+        raise OSError("the file does not read back as it was written")
+    trailer.seal(path)
 
 
 def _add(ds: xr.Dataset, file: Any) -> None:
@@ -181,36 +167,28 @@ def _add(ds: xr.Dataset, file: Any) -> None:
     ds.dump_to_store(NetCDF4DataStore(file), encoding=encoding)
 
 
-def _write_chunks(
+def _declare(
     file: Any,
     frame: xr.Dataset,
     variables: Mapping[str, Variable],
     layout: Layout,
-    chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
+    columns: Mapping[str, NDArray[Any]],
     gaps: Collection[str],
-) -> dict[str, Any]:
-    """Add the columns to a file. Returns their digests."""
-    dims = tuple(map(str, frame.sizes))[: len(layout.sizes)]
+) -> None:
+    """Declare columns in a file, whose values come chunk by chunk."""
+    grid = list(map(str, frame.sizes))[: len(layout.sizes)]
     others = " ".join(str(name) for name in frame.coords if name not in frame.dims)
-    digests: dict[str, Any] = {}
-    for region, columns in chunks:
-        for name, column in columns.items():
-            if name not in digests:
-                fill = MISSING if name in gaps else False
-                inner = column.shape[len(dims) :]
-                for dim, size in zip(variables[name].dims, inner, strict=True):
-                    if dim not in file.dimensions:
-                        file.createDimension(dim, size)
-                all_dims = (*dims, *variables[name].dims)
-                variable = file.createVariable(name, column.dtype, all_dims, fill_value=fill, **_chunked(layout, inner))
-                variable.set_auto_maskandscale(False)
-                _cache_one_chunk(variable)
-                described = variables[name].attributes | error_attribute(name, columns)
-                variable.setncatts(described | ({"coordinates": others} if others else {}))
-                digests[name] = _new_digest()
-            file[name][(*region, ...)] = column
-            _add_values(digests[name], column)
-    return digests
+    for name, column in columns.items():
+        inner = column.shape[len(grid) :]
+        for dim, size in zip(variables[name].dims, inner, strict=True):
+            if dim not in file.dimensions:
+                file.createDimension(dim, size)
+        fill = MISSING if name in gaps else False
+        dims = (*grid, *variables[name].dims)
+        variable = file.createVariable(name, column.dtype, dims, fill_value=fill, **_chunked(layout, inner))
+        variable.set_auto_maskandscale(False)
+        described = variables[name].attributes | error_attribute(name, columns)
+        variable.setncatts(described | ({"coordinates": others} if others else {}))
 
 
 @contextmanager
@@ -224,17 +202,26 @@ def _small_caches() -> Iterator[None]:
         netCDF4.set_chunk_cache(*before)
 
 
-def _cache_one_chunk(variable: Any) -> None:
-    # Each chunk is used once.
-    if variable.dtype is not str and variable.chunking() not in (None, "contiguous"):
-        size = math.prod(variable.chunking()) * np.dtype(variable.dtype).itemsize
-        variable.set_var_chunk_cache(size=2 * size, nelems=11, preemption=1.0)
-
-
 def _chunked(layout: Layout, inner: tuple[int, ...]) -> dict[str, Any]:
     if layout.total * math.prod(inner) < COMPRESSED_FROM:
         return {}
     return {"compression": "zlib", "complevel": 1, "fletcher32": True, "chunksizes": (*layout.chunk, *inner)}
+
+
+#: Kinds of results, by a dimension or a variable that no kind after it has.
+KINDS = {
+    "contender": "errors against run time",
+    "time": "a history",
+    "probability": "a sampled sweep",
+    "residual": "a fit",
+    "vertex": "a boundary",
+    "regime": "a sweep",
+}
+
+
+def kind_of(ds: xr.Dataset) -> str:
+    """The kind of a result, a key of :data:`KINDS`; empty if it is none of them."""
+    return next((mark for mark in KINDS if mark in ds.dims or mark in ds), "")
 
 
 def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
@@ -244,9 +231,8 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
     ----------
     path : path-like
         File that exists.
-    mark : {"regime", "time", "contender", "probability", "residual", "vertex"}
-        Dimension or variable by which the kind is known: sweep, history, error against run time, sampled sweep,
-        fit, or boundary.
+    mark : str
+        A key of :data:`KINDS`.
     content : str
         Contents of the new file, for the message.
 
@@ -256,9 +242,8 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
         If it is no file of this package, or a result of another kind.
     """
     with open_dataset(path) as existing:
-        marks = ("contender", "time", "probability", "residual", "vertex", "regime")
-        kinds = [kind for kind in marks if kind in existing.dims or kind in existing]
-    if kinds[:1] != [mark]:
+        kind = kind_of(existing)
+    if kind != mark:
         raise InputError(str(path), f"holds a result of another kind: name another file for this {content}")
 
 
