@@ -164,6 +164,16 @@ class TestRandomScenes:
         second = relations.in_units(run, **scales).outcomes()
         self.assert_alike(run.outcomes(), relations.in_first_units(second, scales))
 
+    def test_contacts_that_chatter_in_turn_rebound_as_often_in_any_units(self):
+        """Their last hops are as high as a length is rounded that is compared with the radius."""
+        run = relations.random_scenes(KINDS["ring-impact"], 400, rng := np.random.default_rng(1001))
+        run.numbers["impact.restitution"] = rng.uniform(0.5, 0.97, 400)
+        first = run.outcomes()
+        for scale in (10.0, 1e-3):
+            second = relations.in_units(run, length=scale).outcomes()
+            counts = (ds.impacts.values[relations.sure(first, second)] for ds in (first, second))
+            np.testing.assert_array_equal(*counts)
+
     @pytest.mark.parametrize("scales", [{"mass": 2.0**50}, {"length": 2.0**-20}])
     def test_units_that_are_powers_of_two_change_no_bit(self, drawn, scales):
         run, first = drawn

@@ -73,12 +73,12 @@ def _closed_state(mode, x):
 
 @implicit.to_implicit.implements(ImpactRing)
 def _to_implicit(scene, forcing, y):
-    return y[0] - forcing[0], y[1], y[2], y[3], y[6]
+    return y[0] - forcing[0], y[1], y[2], y[3], y[-1]
 
 
 @implicit.from_implicit.implements(ImpactRing)
 def _from_implicit(scene, forcing, x):
-    return x[0] + forcing[0], x[1], x[2], x[3], 0.0, 0.0, x[4]
+    return x[0] + forcing[0], x[1], x[2], x[3], 0.0, 0.0, 0.0, 0.0, x[4]
 
 
 @implicit.common.implements(ImpactRing)

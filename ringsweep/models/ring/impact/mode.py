@@ -1,14 +1,15 @@
 """Modes and states of a body that may leave the race.
 
-A state has seven numbers. The last one is a code of the contacts that are open and of the order of the contacts; it
+A state has nine numbers. The last one is a code of the contacts that are open and of the order of the contacts; it
 tells what the others are:
 
-- both contacts hold: ``(psi, v, 0, 0, 0, 0)``, with the sliding velocity v, m/s;
-- pivot on one contact: ``(psi, v, eta, eta_dot, 0, 0)``. The angle from the ball that touches to the body is
+- both contacts hold: ``(psi, v, 0, 0, 0, 0, 0, 0)``, with the sliding velocity v, m/s;
+- pivot on one contact: ``(psi, v, eta, eta_dot, 0, 0, 0, 0)``. The angle from the ball that touches to the body is
   ``delta = psi - alpha``; eta is its difference from the value at which the other contact closes. So a gap of any size
   has all its digits, and the angular velocity ``d psi/dt = (v + rho eta_dot)/R + d theta/dt`` is that of both contacts
   while eta_dot is zero;
-- flight: ``(psi, d psi/dt, x, dx/dt, y, dy/dt)`` of the centre of mass.
+- flight: ``(psi, d psi/dt, x, dx/dt, y, dy/dt, gap_1, gap_2)``, with the place of the centre of mass. It tells the
+  measures of both gaps, see :data:`GAP_1`, too, but not with all digits of small ones.
 """
 
 from __future__ import annotations
@@ -207,7 +208,7 @@ def coefficients_there(scene, place):
 @inlined
 def frame(scene, y, ring_omega):
     """Place and rates of the pivot in the state `y`."""
-    body, balls, code = scene.closed.body, scene.balls, int(y[6] + 0.5)
+    body, balls, code = scene.closed.body, scene.balls, int(y[-1] + 0.5)
     contact = 2 if code % TURNED == FIRST else 1
     delta = delta_when_closed(body, contact, code // TURNED) + y[2]
     alpha, psi_dot = y[0] - delta, (y[1] + balls.reach * y[3]) / body.radius + ring_omega
@@ -223,6 +224,20 @@ def gap_measure(scene, mode, eta):
     contact, side = holding(mode), side_of(holding(mode))
     beta, turn = side * delta_when_closed(scene.closed.body, contact, mode.turned), 0.5 * side * eta
     return 4.0 * scene.balls.half_distance * cos(beta + turn) * sin(turn)
+
+
+@inlined
+def angle_at_gap(scene, contact, turned, gap, near):
+    """Angle eta of a pivot on `contact` at which the other gap has the measure `gap`, m.
+
+    `near` is this angle, but has lost digits. Where the gap hardly changes with the angle, it is as good as the gap.
+    """
+    side, full = side_of(contact), 4.0 * scene.balls.half_distance
+    beta, turn = side * delta_when_closed(scene.closed.body, contact, turned), 0.5 * side * near
+    slope = full * cos(beta + 2.0 * turn)
+    if abs(slope) > gap:
+        turn -= (full * cos(beta + turn) * sin(turn) - gap) / slope
+    return 2.0 * side * turn
 
 
 @inlined

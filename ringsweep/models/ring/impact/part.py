@@ -53,4 +53,4 @@ def _rejoined(scene, record, mode, guard, part_record, y, c):
         c[RING + PHI, 0] += pi
         for k in range(ORDER + 1):
             c[RING + NORMAL_1, k], c[RING + NORMAL_2, k] = c[RING + NORMAL_2, k], c[RING + NORMAL_1, k]
-    return guard, with_base(record, base), (psi, y[1], 0.0, 0.0, 0.0, 0.0, code_of(mode))
+    return guard, with_base(record, base), (psi, y[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, code_of(mode))

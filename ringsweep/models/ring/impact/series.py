@@ -80,7 +80,7 @@ from ringsweep.physics.friction.velocity import (
 )
 from ringsweep.physics.impact import ImpactRing, side_of
 
-# Size below which a gap and its rate may be rounding, as a share of rho and of the speed of the body.
+# Rate of a gap below which it may be rounding, as a share of the speed of the body.
 _NOISE = 1e-13
 
 # A contact this close to an edge is on the edge, rad: the instant of the crossing is known to rounding.
@@ -119,7 +119,7 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     body, balls = scene.closed.body, scene.balls
     fresh = (mode.zeros_1 if mode.open == FIRST else mode.zeros_2) if y[2] == 0.0 else 0
     c[RING + PHI, 0], c[RING + V, 0], c[ETA, 0] = y[0], y[1], y[2]
-    f = frame(scene, (y[0], y[1], y[2], 0.0 if fresh > 1 else y[3], 0.0, 0.0, y[6]), c[RING + THETA, 1])
+    f = frame(scene, (y[0], y[1], y[2], 0.0 if fresh > 1 else y[3], *y[4:]), c[RING + THETA, 1])
     sharpness = _expand_pivot_motion(scene, mode, f, fresh, c)
     _expand_pivot_guards(scene, mode, f, y[2], fresh, c)
     per_angle = 1.0 / tolerance
@@ -264,7 +264,7 @@ def _divide(c, row, quotient, zeros):
 def _expand_flight(scene, mode, y, tolerance, c):
     """Fill the series of a parabola with constant spin, and of both gaps; return what :func:`series.expand` does."""
     body, balls = scene.closed.body, scene.balls
-    psi, spin, x, x_dot, y_0, y_dot, _ = y
+    psi, spin, x, x_dot, y_0, y_dot, _, _, _ = y
     for row in (X, Y):
         _fill_constant(c[row], 0.0)
     for row in (PHI, V, OMEGA, EPSILON, SQUARE, DETERMINANT, SLOW, NORMAL_2, EDGE, FAST):
@@ -282,13 +282,14 @@ def _expand_flight(scene, mode, y, tolerance, c):
         distance = sqrt(x * x + y_0 * y_0)
         h = 0.1 * h * max(distance / balls.reach, 0.05)
     last = previous = 0.0
-    for contact, gap, guard, zeros in (
-        (1, GAP_1, RING + NORMAL_1, mode.zeros_1),
-        (2, GAP_2, RING + NORMAL_2, mode.zeros_2),
+    for contact, gap, guard, zeros, now in (
+        (1, GAP_1, RING + NORMAL_1, mode.zeros_1, y[6]),
+        (2, GAP_2, RING + NORMAL_2, mode.zeros_2, y[7]),
     ):
         if contact == 1 or two:
             _expand_gap(scene, contact, psi, spin, c, gap)
-            found = _leading_zeros(c[gap], zeros, _NOISE * balls.reach, noise)
+            c[gap, 0] = now
+            found = _leading_zeros(c[gap], zeros, noise)
             _divide(c, gap, guard, found)
             last = max(last, abs(c[gap, ORDER]) / (balls.reach * tolerance))
             previous = max(previous, abs(c[gap, ORDER - 1]) / (balls.reach * tolerance))
@@ -298,7 +299,7 @@ def _expand_flight(scene, mode, y, tolerance, c):
 
 @inlined
 def _expand_gap(scene, contact, psi, spin, c, row):
-    """Fill the series of (rho^2 - x^2 - y^2)/(2 rho) of a ball in flight."""
+    """Fill the series of (rho^2 - x^2 - y^2)/(2 rho) of a ball in flight, but for its first coefficient."""
     balls = scene.balls
     a, h = side_of(contact) * balls.half_distance, balls.offset
     s, k_s = sin(psi), cos(psi)
@@ -308,18 +309,17 @@ def _expand_gap(scene, contact, psi, spin, c, row):
         # The next derivatives of sine and cosine.
         s, k_s = k_s, -s
         power *= spin * INVERSE[k + 1]
-    for k in range(ORDER + 1):
+    for k in range(1, ORDER + 1):
         total = 0.0
         for j in range(k + 1):
             total += c[SPARE, j] * c[SPARE, k - j] + c[OTHER, j] * c[OTHER, k - j]
         c[row, k] = -0.5 * total / balls.reach
-    c[row, 0] += 0.5 * balls.reach
 
 
 @inlined
-def _leading_zeros(gap, zeros, least, least_rate):
+def _leading_zeros(gap, zeros, least_rate):
     """Number of leading coefficients of a gap that are rounding: at most as many as were zero when the flight began."""
-    if zeros == 0 or gap[0] > least:
+    if zeros == 0 or gap[0] != 0.0:
         return 0
     if gap[1] > least_rate:
         return 1
@@ -350,13 +350,15 @@ def _state_at(scene, c, s):
     contacts, code = int(c[KIND, 0]) % TURNED, c[KIND, 0]
     psi = value(c[RING + PHI], s)
     if contacts == NONE:
-        return psi, value(c[RING + V], s), 0.0, 0.0, 0.0, 0.0, code
+        return psi, value(c[RING + V], s), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, code
     if contacts == BOTH:
         rate = c[RING + OMEGA, 0]
         if _is_particle_in_flight(scene, contacts):
             psi, rate, _ = _polar(scene, c, s)
-        return psi, rate, value(c[X], s), slope(c[X], s), value(c[Y], s), slope(c[Y], s), code
-    return psi, value(c[RING + V], s), value(c[ETA], s), slope(c[ETA], s), 0.0, 0.0, code
+        gap_2 = value(c[GAP_2], s) if ring.contact_count(scene.closed.body) == 2 else 0.0
+        place = value(c[X], s), slope(c[X], s), value(c[Y], s), slope(c[Y], s)
+        return psi, rate, *place, value(c[GAP_1], s), gap_2, code
+    return psi, value(c[RING + V], s), value(c[ETA], s), slope(c[ETA], s), 0.0, 0.0, 0.0, 0.0, code
 
 
 @series.rates_at.implements(ImpactRing)
@@ -364,13 +366,13 @@ def _rates_at(scene, c, s):
     contacts = int(c[KIND, 0]) % TURNED
     psi_dot = slope(c[RING + PHI], s)
     if contacts == BOTH:
-        return psi_dot, 0.0, slope(c[X], s), 0.0, slope(c[Y], s), -scene.closed.body.gravity, 0.0
+        return psi_dot, 0.0, slope(c[X], s), 0.0, slope(c[Y], s), -scene.closed.body.gravity, 0.0, 0.0, 0.0
     eta_dot = eta_dd = 0.0
     if contacts != NONE:
         eta_dot = slope(c[ETA], s)
         differentiate(c[ETA], c[SPARE])
         eta_dd = slope(c[SPARE], s)
-    return psi_dot, slope(c[RING + V], s), eta_dot, eta_dd, 0.0, 0.0, 0.0
+    return psi_dot, slope(c[RING + V], s), eta_dot, eta_dd, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @inlined

@@ -28,6 +28,7 @@ from ringsweep.models.ring.impact.mode import (
     TURNED,
     Event,
     Mode,
+    angle_at_gap,
     angle_when_closed,
     closed_mode,
     code_of,
@@ -36,6 +37,7 @@ from ringsweep.models.ring.impact.mode import (
     distances_to_edges,
     frame,
     from_closed,
+    gap_measure,
     holding,
     in_flight,
     make,
@@ -83,7 +85,8 @@ _FORBIDDEN = 1e-10
 # passes through infinity, in the instant of a jam, leaves one that does.
 _NO_LOAD = 1e-6
 
-# A contact whose gap is this share of rho touches together with the one that closes. Gaps are rounded by the second.
+# A contact that would close after this share of the time since the last event closes together with the one that does.
+# By the second share it may be late by rounding.
 _TOGETHER, _ROUNDING = 1e-12, 1e-15
 
 
@@ -91,7 +94,7 @@ _TOGETHER, _ROUNDING = 1e-12, 1e-15
 def motion_of(scene, y, ring_omega):
     """Motion of the body in space."""
     closed, balls = scene.closed.body, scene.balls
-    code = int(y[6] + 0.5)
+    code = int(y[-1] + 0.5)
     contacts, turned = code % TURNED, code // TURNED
     if contacts == NONE:
         phi, omega = angle_when_closed(y[0], turned), ring.angular_velocity(closed, y[1], ring_omega)
@@ -114,10 +117,10 @@ def motion_of(scene, y, ring_omega):
 
 
 @inlined
-def state_in_flight(motion, turned):
-    """State of a body without contacts."""
+def state_in_flight(motion, turned, gaps):
+    """State of a body without contacts, from the measures of its gaps, m."""
     code = float(BOTH + TURNED * turned)
-    return motion.psi, motion.psi_dot, motion.x, motion.x_dot, motion.y, motion.y_dot, code
+    return motion.psi, motion.psi_dot, motion.x, motion.x_dot, motion.y, motion.y_dot, *gaps, code
 
 
 @inlined
@@ -146,7 +149,7 @@ def _opened(scene, t, y, before, which, zeros, event):
     _, ring_omega, _ = drives.turn(scene.drive, t)
     places, turned = (before.place_1, before.place_2), before.turned
     if which != BOTH:
-        state = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(which + TURNED * turned)
+        state = y[0], y[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(which + TURNED * turned)
         contact = 2 if which == FIRST else 1
         if turned == 1 and contact == 2:
             # In the frame of a pivot this contact stands a revolution ahead of its angle in the closed ring.
@@ -160,8 +163,8 @@ def _opened(scene, t, y, before, which, zeros, event):
         if _presses(scene, 3 - contact, motion):
             # Neither contact can carry the body alone, and without both the one that is lost would close again.
             return JAM, make(1, 0, -1, places, (which, turned), empty, event), state
-    closed = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(TURNED * turned)
-    state = state_in_flight(motion_of(scene, closed, ring_omega), turned)
+    closed = y[0], y[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(TURNED * turned)
+    state = state_in_flight(motion_of(scene, closed, ring_omega), turned, (0.0, 0.0))
     return RUNNING, in_flight(places, turned, (zeros, zeros), event), state
 
 
@@ -175,7 +178,7 @@ def _after_closed(scene, status, mode, t, y, zeros, is_new):
     if which != NONE:
         lost = with_passed(event, 1) if is_new else opens(which, event.number, t)
         return _opened(scene, t, y, mode, which, zeros, lost)
-    return status, mode, (y[0], y[1], 0.0, 0.0, 0.0, 0.0, code_of(mode))
+    return status, mode, (y[0], y[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, code_of(mode))
 
 
 @modes.initial_state.implements(ImpactRing)
@@ -197,7 +200,7 @@ def _taken_along(scene, t, wedged):
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     carried = scene.closed.body.radius * ring_epsilon
     psi_dd, alpha_dd, _, _ = in_stick(frame(scene, y, ring_omega), carried)
-    state = y[0], y[1], y[2], (psi_dd - alpha_dd) / ring_epsilon * ring_omega, y[4], y[5], y[6]
+    state = y[0], y[1], y[2], (psi_dd - alpha_dd) / ring_epsilon * ring_omega, *y[4:]
     return status, with_zeros(mode, min(mode.zeros_1, 1), min(mode.zeros_2, 1)), state
 
 
@@ -247,7 +250,7 @@ def _switch(scene, mode, guard, t, y):
             return JAM, mode, y
         zeros = _remaining(mode, y, (3, mode.zeros_2) if contact == 1 else (mode.zeros_1, 3))
         flight = in_flight((mode.place_1, mode.place_2), mode.turned, zeros, opens(contact, mode.event.number, t))
-        return RUNNING, flight, state_in_flight(motion, mode.turned)
+        return RUNNING, flight, state_in_flight(motion, mode.turned, _gaps_in_pivot(scene, mode, y))
     return _on_one_contact(scene, mode, guard, t, y)
 
 
@@ -263,6 +266,13 @@ def _jammed(scene, mode, v):
 
 
 @inlined
+def _gaps_in_pivot(scene, mode, y):
+    """Measures of both gaps in a pivot, m."""
+    gap = gap_measure(scene, mode, y[2])
+    return (gap, 0.0) if mode.open == FIRST else (0.0, gap)
+
+
+@inlined
 def _remaining(mode, y, zeros):
     """Zeros of both gaps: those of the contact that was open before are zeros no more once the gap has grown."""
     if y[2] == 0.0:
@@ -273,7 +283,7 @@ def _remaining(mode, y, zeros):
 @inlined
 def _on_one_contact(scene, mode, guard, t, y):
     """What follows in a pivot after an edge, at the bounds of a region of the law, at rest, and at breakaway."""
-    v, at_rest = y[1], (y[0], 0.0, y[2], y[3], 0.0, 0.0, y[6])
+    v, at_rest = y[1], (y[0], 0.0, *y[2:])
     sign, region = mode.sign, mode.region
     if guard == EDGE:
         mode = with_place(mode, _beyond_nearer_edge(scene, mode, t, y))
@@ -318,7 +328,8 @@ def _begun(scene, t, y, stick, stick_end):
     if status == JAM and not load(frame(scene, y, ring_omega)) > 0.0:
         zeros = (2, stick.zeros_2) if contact == 1 else (stick.zeros_1, 2)
         flight = in_flight((stick.place_1, stick.place_2), turned, zeros, opens(contact, stick.event.number, t))
-        return RUNNING, flight, state_in_flight(motion_of(scene, y, ring_omega), turned)
+        motion = motion_of(scene, y, ring_omega)
+        return RUNNING, flight, state_in_flight(motion, turned, _gaps_in_pivot(scene, stick, y))
     return status, found, y
 
 
@@ -333,6 +344,7 @@ def _impact_friction(scene, contact, theta):
 
 # A contact that holds: its gap does not change, and its sliding velocity is a state.
 _held = replacing("gap", "opening", "slip")
+_with_gap = replacing("gap")
 
 
 class _Landing(NamedTuple):
@@ -388,7 +400,7 @@ class _Tried(NamedTuple):
     solutions: int
     status: int
     mode: Mode
-    state: tuple[float, float, float, float, float, float, float]
+    state: tuple[float, float, float, float, float, float, float, float, float]
     motion: Motion
     rebounds: tuple[bool, bool]
     openings: tuple[float, float]
@@ -401,8 +413,8 @@ def _lands(scene, mode, hit, t, y):
     landing, hits = _landing(scene, mode, hit, t, y)
     tried = _try(scene, mode, t, y, landing, hits, (e, e), lasts)
     first, second = landing.contacts
-    apart = (second.gap if hit == 1 else first.gap) > _ROUNDING * scene.balls.reach
-    if tried.solutions != 1 and hits[0] and hits[1] and apart:
+    together = _closes_within(_ROUNDING, mode, t, second if hit == 1 else first)
+    if tried.solutions != 1 and hits[0] and hits[1] and not together:
         # What has no solution for both at once may have one for each in turn.
         hits = hit == 1, hit == 2
         tried = _try(scene, mode, t, y, landing, hits, (e, e), lasts)
@@ -426,8 +438,7 @@ def _lands(scene, mode, hit, t, y):
         return BROKEN if tried.solutions != 1 else JAM, mode, y
     lasts = _rocking_ends(scene, mode, t, tried)
     if lasts > 0.0:
-        psi, v, _, _, _, _, _ = tried.state
-        rests = _close(scene, t, psi, v, tried.mode.turned, with_lasts(tried.mode.event, lasts))
+        rests = _close(scene, t, tried.state[0], tried.state[1], tried.mode.turned, with_lasts(tried.mode.event, lasts))
         if rests[0] == RUNNING and rests[1].open == NONE:
             return rests
     return tried.status, tried.mode, tried.state
@@ -444,19 +455,25 @@ def _landing(scene, mode, hit, t, y):
     two = ring.contact_count(scene.closed.body) == 2
     first = contact_of(balls, 1, relative)
     second = contact_of(balls, 2, relative) if two else first
-    near = _TOGETHER * balls.reach
     hits_1, hits_2 = hit == 1, hit == 2
     holds_1 = holds_2 = False
     if mode.open == BOTH:
+        first, second = _with_gap(first, y[6]), _with_gap(second, y[7])
         if two:
-            hits_1 = hits_1 or (first.gap <= near and first.opening < 0.0)
-            hits_2 = hits_2 or (second.gap <= near and second.opening < 0.0)
+            hits_1 = hits_1 or _closes_within(_TOGETHER, mode, t, first)
+            hits_2 = hits_2 or _closes_within(_TOGETHER, mode, t, second)
     elif hit == 2:
         first, holds_1 = _held(first, 0.0, 0.0, y[1]), True
     else:
         second, holds_2 = _held(second, 0.0, 0.0, y[1]), True
     mu = _impact_friction(scene, first, theta), _impact_friction(scene, second, theta)
     return _Landing(motion, (first, second), (holds_1, holds_2), mu), (hits_1, hits_2)
+
+
+@inlined
+def _closes_within(share, mode, t, contact):
+    """Whether a contact closes within this share of the time since the last event."""
+    return contact.opening < 0.0 and contact.gap <= -share * contact.opening * (parts(t)[0] - mode.event.time)
 
 
 @inlined
@@ -586,8 +603,9 @@ def _next(scene, t, motion, mode, impact, event):
         ahead = second.sine * first.cosine - second.cosine * first.sine
         turned = 1 if ahead < 0.0 else 0
     zeros = (1 if touched[0] and are_open[0] else 0), (1 if touched[1] and are_open[1] else 0)
+    gaps = (0.0 if touched[0] else first.gap), (0.0 if touched[1] else second.gap)
     if are_open[0] and (are_open[1] or not two):
-        return RUNNING, in_flight(places, turned, zeros, event), state_in_flight(motion, turned)
+        return RUNNING, in_flight(places, turned, zeros, event), state_in_flight(motion, turned, gaps)
     if not two or not (are_open[0] or are_open[1]):
         v = found.slip_1
         if two and (found.slip_2 == 0.0 or abs(found.slip_2) < abs(v)):
@@ -605,11 +623,11 @@ def _next(scene, t, motion, mode, impact, event):
     away = away - 2.0 * pi * round(away / (2.0 * pi))
     along = (v + body.radius * ring_omega - balls.radius * motion.psi_dot) / balls.reach
     rate = motion.psi_dot - along
+    away = 0.0 if other_touched else angle_at_gap(scene, contact, turned, gaps[2 - contact], away)
     if other_touched:
-        away = 0.0
         rate = opening / (2.0 * balls.half_distance * side * cos(delta))
     which = FIRST if contact == 2 else SECOND
-    state = motion.psi, v, away, rate, 0.0, 0.0, float(which + TURNED * turned)
+    state = motion.psi, v, away, rate, 0.0, 0.0, 0.0, 0.0, float(which + TURNED * turned)
     f = frame(scene, state, ring_omega)
     # A place counts the revolutions of the angle that the frame has.
     place = locate(scene.closed.surface, f.alpha - theta)
@@ -620,7 +638,7 @@ def _next(scene, t, motion, mode, impact, event):
         return status, found_mode, state
     # The contact that has just closed opens again, without an impact.
     zeros = (zeros[0], 2) if contact == 2 else (2, zeros[1])
-    return RUNNING, in_flight(places, turned, zeros, event), state_in_flight(motion, turned)
+    return RUNNING, in_flight(places, turned, zeros, event), state_in_flight(motion, turned, gaps)
 
 
 @inlined
