@@ -19,7 +19,7 @@ from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import StepControl, implicit_step, start_at, start_control
-from ringsweep.solvers.steps import Step, lent, scratch_for, without_rows
+from ringsweep.solvers.steps import Step, lent, scratch_for
 from ringsweep.solvers.taylor import series_step
 from ringsweep.solvers.variation import at_event
 
@@ -164,31 +164,13 @@ def _step_in(kind, scene, run, h_max, tolerances, scratch):
 def _step_in_part(kind, scene, run, h_max, tolerances, scratch):
     if not simpler.is_simpler(scene, run.mode):
         return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
-    part, mode, y = simpler.part(scene, run.mode, run.y)
-    run_of_part = Run(simpler.part_of_record(scene, run.record, run.mode), mode, run.now, y, run.control, run.local)
-    first = simpler.first_row(scene)
+    part, record, y = simpler.part(scene, run.record, run.mode, run.y)
+    run_of_part = Run(record, run.mode, run.now, y, run.control, run.local)
     is_implicit, guard, s, y, record, control, local = _step(
-        family(scene.law), part, run_of_part, h_max, tolerances, without_rows(scratch, first)
+        family(scene.law), part, run_of_part, h_max, tolerances, scratch
     )
-    guard, record, y = simpler.rejoined(
-        scene, run.record, run.mode, guard + first if guard >= 0 else -1, record, y, scratch.c
-    )
+    record, y = simpler.rejoined(scene, run.record, run.mode, record, y, scratch.c)
     return is_implicit, guard, s, y, record, control, local
-
-
-@hook(optional=True)
-def _begin_in(kind, scene, mode, now, y, tolerances, c):
-    """Record at the beginning of a run of a scene, or of the simpler scene whose mode it is in."""
-    return _begin(family(scene.law), scene, mode, now, y, tolerances, c)
-
-
-@_begin_in.implements(simpler.Parted)
-def _begin_in_part(kind, scene, mode, now, y, tolerances, c):
-    if not simpler.is_simpler(scene, mode):
-        return _begin(family(scene.law), scene, mode, now, y, tolerances, c)
-    part, part_mode, part_y = simpler.part(scene, mode, y)
-    record = _begin(family(scene.law), part, part_mode, now, part_y, tolerances, c[simpler.first_row(scene) :])
-    return simpler.begun(scene, record)
 
 
 @hook
@@ -371,7 +353,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         t, y = modes.initial_state(scene)
         now = Instant(t, 0.0)
         status, mode = modes.initial_mode(scene, now, y)
-        begun = _begin_in(simpler.kind(scene), scene, mode, now, y, tolerances, c)
+        begun = _begin(family(scene.law), scene, mode, now, y, tolerances, c)
         record = recorder.lend(scene, begun, take(rows, i))
         record = recorder.after_event(scene, record, mode, mode, t)
         control = start_control(scene)
@@ -422,7 +404,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                 record = at_event(variation.asked(scene), scene, record, step.mode, guard, now, y_next)
                 record = recorder.after_event(scene, record, step.mode, mode, now.t)
             # The regime of a run that goes on after a loss is that loss: what ends the run later does not count.
-            decides = status != RUNNING or modes.first_loss(step.mode, mode)
+            decides = status != RUNNING or modes.first_loss(scene, step.mode, mode)
             if audited and guard >= 0 and s > 0.0 and decides and guard_fall_rate == 0.0:
                 # A reaction that jumps to zero at another event does not rise again before.
                 falls = audit_of_model.is_reaction(scene, guard)

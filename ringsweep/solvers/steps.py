@@ -77,13 +77,6 @@ def lent(scratch):
     return Scratch(borrowed(c), borrowed(work), borrowed(course), borrowed(bends), borrowed(samples), first_guard)
 
 
-@inlined
-def without_rows(scratch, first):
-    """Scratch whose table of series begins with the row `first`."""
-    c, work, course, bends, samples, first_guard = scratch
-    return Scratch(c[first:], work, course, bends, samples, first_guard - first)
-
-
 def scratch_for(rows: int, components: int, first_guard: int) -> Scratch:
     """Scratch for a table of so many series and for states of so many components."""
     # NumPy's functions that make arrays would have to be compiled into each kernel.

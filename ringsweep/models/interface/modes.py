@@ -139,11 +139,13 @@ def sticks(scene, mode):
 
 
 @hook(optional=True)
-def first_loss(before, after):
+def first_loss(scene, before, after):
     """Whether an event between two modes is the first loss of a contact of a run that goes on.
 
     Parameters
     ----------
+    scene : NamedTuple
+        One cell.
     before, after : NamedTuple
         Modes before and after the event.
 

@@ -27,44 +27,22 @@ def is_simpler(scene, mode):
 
 
 @hook
-def first_row(scene):
-    """First row of the table of series that belongs to the simpler scene; its table is the rest."""
+def part(scene, record, mode, y):
+    """Simpler scene, and record and state there."""
 
 
 @hook
-def part(scene, mode, y):
-    """Simpler scene, and mode and state there."""
-
-
-@hook
-def part_of_record(scene, record, mode):
-    """Record of the simpler scene."""
-
-
-@hook
-def begun(scene, part_record):
-    """Record at the beginning of a run, from that of the simpler scene."""
-
-
-@hook
-def rejoined(scene, record, mode, guard, part_record, y, c):
-    """Guard, record and state after a step of the simpler scene.
+def rejoined(scene, record, mode, part_record, y, c):
+    """Record and state after a step of the simpler scene.
 
     Parameters
     ----------
     scene, record, mode : NamedTuple
         The scene, its record before the step, and its mode.
-    guard : int
-        Guard that ended the step, a row of the table, or -1.
     part_record : NamedTuple
         Record of the simpler scene after the step.
     y : tuple of float
         State of the simpler scene after the step.
     c : ndarray
-        Table of series of the scene. What the step has left there is made that of the scene.
-
-    Returns
-    -------
-    tuple
-        ``(guard, record, state)``
+        Table of series. What the step has left there is made that of the scene.
     """

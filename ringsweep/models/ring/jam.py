@@ -13,7 +13,7 @@ from math import cos, inf, sin
 from ringsweep.compile import hook, inlined
 from ringsweep.models.interface import modes, recorder
 from ringsweep.models.ring.bristles import sliding_at
-from ringsweep.models.ring.impact.mode import BOTH, FIRST, NONE, angle_when_closed, closed_mode, frame, ring_of
+from ringsweep.models.ring.impact.mode import BOTH, FIRST, NONE, frame, ring_of
 from ringsweep.models.ring.impact.pivot import friction
 from ringsweep.models.ring.impact.record import with_base
 from ringsweep.models.ring.record import with_peaks
@@ -72,7 +72,7 @@ def _balance_of_pivot(scene, mode, t, y, v):
     psi_dd, alpha_dd, normal, _ = found
     acceleration = pivot.sliding_acceleration(f, found, scene.closed.body.radius * ring_epsilon)
     load = normal / (f.mass * pivot.size(f))
-    first = mode.open != FIRST
+    first = mode.contacts.open != FIRST
     share = pivot.determinant(f, K) / f.inertia
     return share, acceleration, psi_dd - alpha_dd, load if first else 0.0, 0.0 if first else load
 
@@ -120,12 +120,11 @@ def _limit_of_bristles(scene, mode, t, y):
 
 @modes.limit_of_jam.implements(ImpactRing)
 def _limit_of_impact_ring(scene, mode, t, y):
-    if mode.sign == 0 or mode.open == BOTH:
+    contacts = mode.contacts
+    if mode.sign == 0 or contacts.open == BOTH:
         return 0.0, y, (0.0, 0.0)
-    if mode.open == NONE:
-        closed = angle_when_closed(y[0], mode.turned), y[1]
-        s, (_, v), normals = modes.limit_of_jam(ring_of(scene, mode.turned), closed_mode(mode), t, closed)
-        normals = (normals[1], normals[0]) if mode.turned == 1 else normals
+    if contacts.open == NONE:
+        s, (_, v), normals = modes.limit_of_jam(ring_of(scene, contacts.turned), mode, t, (y[0], y[1]))
         return s, (y[0], v, *y[2:]), normals
     s, change, tilt, normals = _limit(scene, mode, t, y)
     return s, (y[0], y[1] + change, y[2], y[3] + tilt, *y[4:]), normals

@@ -12,9 +12,9 @@ equation is left.
 from __future__ import annotations
 
 from math import cos, inf, isnan, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined, specialise
+from ringsweep.compile import absorbed, hook, inlined, replacing, specialise
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
@@ -68,12 +68,14 @@ from ringsweep.physics.friction.velocity import (
     varies,
 )
 
-# Rows of the table of series. The guards are last. DETERMINANT is the first guard: the others mean nothing after
-# a jam.
-PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPARE = range(9)
-# Factors of the products that grow side by side, in several rows.
-FACTORS = 9
-_GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
+# Rows of the table of series. Those from KIND on belong to a body that may leave the race. KIND holds the code of the
+# state; GAP_1 and GAP_2 are ``(rho^2 - |c|^2)/(2 rho)``, a measure of the gap that has a series; ETA belongs to a
+# pivot; X and Y are the centre of mass in a flight, and u and w of a pivot.
+PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPARE, OTHER, KIND, GAP_1, GAP_2, ETA, X, Y = range(16)
+# Factors of the products that grow side by side, in several rows: those of a pivot need a group more.
+FACTORS = 16
+_GUARDS = FACTORS + (MOST_GROUPS + 1) * FACTOR_ROWS
+# The guards are last. DETERMINANT is the first guard: the others mean nothing after a jam.
 DETERMINANT, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(_GUARDS, _GUARDS + 6)
 
 # Numbers behind those of the powers of a series, and zeros.
@@ -110,7 +112,9 @@ class Mode(NamedTuple):
     entry_guard : int
         Row of the guard that is zero on entry, or -1.
     place_1, place_2 : tuple of int
-        Segment and turn of each contact.
+        Segment and turn of each contact. An open contact keeps its last place.
+    contacts : Contacts
+        Which contacts are open, of a body that may leave the race; an empty tuple if it may not.
     """
 
     sign: int
@@ -118,6 +122,12 @@ class Mode(NamedTuple):
     entry_guard: int
     place_1: tuple[int, int]
     place_2: tuple[int, int]
+    contacts: Any
+
+
+#: Mode with another slip, at other places, and with other contacts.
+with_slip, with_places = replacing("sign", "region", "entry_guard"), replacing("place_1", "place_2")
+with_contacts = replacing("contacts")
 
 
 @modes.initial_state.implements(ring.Ring)
@@ -137,7 +147,7 @@ def _sliding_at_start_of_power(drive, scene, t, phi, launch):
     v = drives.velocity_at_beginning(drive, launch) * scene.body.radius
     if leaves_behind(drive, scene, t, v):
         theta, _, _ = drives.turn(drive, t)
-        status, mode = _mode_at_rest(scene, Instant(t, 0.0), phi, *places_at(scene, phi - theta), 0)
+        status, mode = _mode_at_rest(scene, _held_at(scene, phi - theta), Instant(t, 0.0), phi, 0)
         # A body that is wedged between its contacts is taken along.
         if status == RUNNING and mode.sign == 0:
             return 0.0
@@ -172,12 +182,12 @@ def _table_shape(scene):
 def _initial_mode(scene, t, y):
     phi, v = y
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    place_1, place_2 = places_at(scene, phi - theta)
+    held = _held_at(scene, phi - theta)
     if v == 0.0 and stiction_band(scene.law) == 0.0:
-        return _mode_at_rest(scene, t, phi, place_1, place_2, 0)
+        return _mode_at_rest(scene, held, t, phi, 0)
     if leaves_behind(scene.drive, scene, t, v):
         # Such a ring may push the body off a contact, or jam it.
-        status, mode = _mode_at_rest(scene, t, phi, place_1, place_2, 0)
+        status, mode = _mode_at_rest(scene, held, t, phi, 0)
         if status != RUNNING:
             return status, mode
     sign = 1 if v > 0.0 else -1
@@ -186,8 +196,21 @@ def _initial_mode(scene, t, y):
         # Friction is zero here, so that the body slides in the direction in which the other forces accelerate it.
         epsilon, _ = ring.acceleration(scene.body, 0.0, 0.0, (sin(phi), cos(phi), ring_omega))
         sign, entry_guard = (1 if epsilon >= ring_epsilon else -1), SLOW
-    mode = Mode(sign, region, entry_guard, *places_beyond(scene, place_1, place_2, phi - theta, sign))
+    mode = _slipping(scene, held, phi - theta, (sign, region, entry_guard))
     return _status_at_start(scene.drive, scene, mode, t, y), mode
+
+
+@inlined
+def _held_at(scene, rho):
+    """Mode of a body that sticks at the angle `rho` in the ring's frame, rad."""
+    place_1, place_2 = places_at(scene, rho)
+    return Mode(0, KINETIC, -1, place_1, place_2, ())
+
+
+@inlined
+def _slipping(scene, mode, rho, slip):
+    """Mode of a body that begins to slip; `slip` is the sign, the region of the law, and the entry guard."""
+    return with_slip(with_places(mode, *places_beyond(scene, mode.place_1, mode.place_2, rho, slip[0])), *slip)
 
 
 @hook(optional=True)
@@ -210,7 +233,7 @@ def _status_after_jerk(drive, scene, mode, t, y):
     # the body would jam.
     for i in range(1, _SPEEDS):
         slower = v * i / _SPEEDS
-        there = Mode(mode.sign, region_at(scene.law, abs(slower)), -1, mode.place_1, mode.place_2)
+        there = with_slip(mode, mode.sign, region_at(scene.law, abs(slower)), -1)
         earlier = _after_jump(scene, there, t, (phi, slower))
         if earlier != RUNNING:
             return earlier
@@ -230,13 +253,13 @@ def _at_breakaway(scene, mode):
 
 
 @inlined
-def _mode_at_rest(scene, t, phi, place_1, place_2, stick_end):
+def _mode_at_rest(scene, mode, t, phi, stick_end):
     """Status and mode of a set-valued law at zero sliding velocity; see :func:`contact.at_rest` for `stick_end`."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     region = region_at(scene.law, 0.0)
-    stick = Mode(0, KINETIC, -1, place_1, place_2)
-    forward = Mode(1, region, SLOW, *places_beyond(scene, place_1, place_2, phi - theta, 1))
-    backward = Mode(-1, region, SLOW, *places_beyond(scene, place_1, place_2, phi - theta, -1))
+    stick = with_slip(mode, 0, KINETIC, -1)
+    forward = _slipping(scene, mode, phi - theta, (1, region, SLOW))
+    backward = _slipping(scene, mode, phi - theta, (-1, region, SLOW))
     mu_s1, _, mu_s2, _ = coefficients_under(scene, stick)
     breakaway = _at_breakaway(scene, forward), _at_breakaway(scene, backward)
     problem = *breakaway, (sin(phi), cos(phi), ring_omega), ring_epsilon
@@ -245,9 +268,9 @@ def _mode_at_rest(scene, t, phi, place_1, place_2, stick_end):
         # A contact on an edge may belong to either side.
         for slip in (forward, backward):
             mu_s1, _, mu_s2, _ = coefficients_under(scene, slip)
-            on_edge = slip.place_1 != place_1 or slip.place_2 != place_2
+            on_edge = slip.place_1 != mode.place_1 or slip.place_2 != mode.place_2
             if on_edge and contact.at_rest(scene.body, (mu_s1, mu_s2), *problem, 0) == contact.STICK:
-                return RUNNING, Mode(0, KINETIC, -1, slip.place_1, slip.place_2)
+                return RUNNING, with_slip(slip, 0, KINETIC, -1)
     if found == contact.FORWARD:
         return RUNNING, forward
     if found == contact.BACKWARD:
@@ -354,38 +377,47 @@ def _status_when_stalled(scene, mode, t, y):
 @modes.switch.implements(ring.Ring)
 def _switch(scene, mode, guard, t, y):
     phi, v = y
-    sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
     if guard in (NORMAL_1, NORMAL_2):
         return _after_zero_reaction(scene, mode, guard == NORMAL_1, t, y), mode, y
     if guard == DETERMINANT:
         return JAM, mode, y
-    if sign == 0:
-        mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    stick_end = 0
+    if mode.sign == 0:
         if guard == EDGE and contact.folds(scene.body, mu_s1, mu_s2):
             (normal_1, normal_2), scale = _loads_as_stick_ends(scene, mode, t, y, True)
             if min(normal_1, normal_2) <= _LEAST_AT_FOLD * scale:
                 return _lost(scene.body, (normal_1, normal_2), scale, normal_1 <= normal_2), mode, y
         stick_end = 1 if guard == SLOW else -1 if guard == FAST else 2
-        status, mode = _mode_at_rest(scene, t, phi, place_1, place_2, stick_end)
+    else:
+        if guard == EDGE:
+            mode = with_places(mode, *places_after_edge(scene, mode, phi - drives.turn(scene.drive, t)[0]))
+        mode, v = slip_after(scene.law, mode, guard, v, mu_s1 + mu_s2)
+    if mode.sign == 0:
+        status, mode = _mode_at_rest(scene, mode, t, phi, stick_end)
         return status, mode, (phi, 0.0)
-    if guard == EDGE:
-        theta, _, _ = drives.turn(scene.drive, t)
-        place_1, place_2 = places_after_edge(scene, mode, phi - theta)
-        mode = Mode(sign, region, SLOW if v == 0.0 else -1, place_1, place_2)
-    low, high = region_bounds(scene.law, region)
+    return _after_jump(scene, mode, t, (phi, v)), mode, (phi, v)
+
+
+@inlined
+def slip_after(law, mode, guard, v, mu_s):
+    """Mode and sliding velocity after slip has crossed an edge, or has come to an end of its region of the law.
+
+    The mode is stick if the body is at rest and friction may hold it: then the contact problem decides.
+    """
+    sign, region = mode.sign, mode.region
+    low, high = region_bounds(law, region)
     # A formula may jump at the bound of a region.
     if guard == FAST:
-        mode, v = Mode(sign, region + 1, SLOW, place_1, place_2), sign * high
-    elif guard == SLOW and low > 0.0:
-        mode, v = Mode(sign, region - 1, FAST, place_1, place_2), sign * low
-    if guard != SLOW or low > 0.0:
-        return _after_jump(scene, mode, t, (phi, v)), mode, (phi, v)
-    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+        return with_slip(mode, sign, region + 1, SLOW), sign * high
+    if guard == SLOW and low > 0.0:
+        return with_slip(mode, sign, region - 1, FAST), sign * low
+    if guard != SLOW:
+        return with_slip(mode, sign, region, SLOW if v == 0.0 else -1), v
     # A body that nothing holds passes through rest.
-    if region < 0 or mu_s1 + mu_s2 == 0.0:
-        return RUNNING, Mode(-sign, region, SLOW, place_1, place_2), (phi, 0.0)
-    status, next_mode = _mode_at_rest(scene, t, phi, place_1, place_2, 0)
-    return status, next_mode, (phi, 0.0)
+    if region < 0 or mu_s == 0.0:
+        return with_slip(mode, -sign, region, SLOW), 0.0
+    return with_slip(mode, 0, KINETIC, -1), 0.0
 
 
 @series.expand.implements(ring.Ring)
@@ -665,4 +697,4 @@ def _row(scene, mode, c, t, s):
 
 @series.after_first_step.implements(Mode)
 def _after_first_step(mode):
-    return Mode(mode.sign, mode.region, -1, mode.place_1, mode.place_2)
+    return with_slip(mode, mode.sign, mode.region, -1)

@@ -17,9 +17,6 @@ from ringsweep.models.ring.audit import least_rates, undecided_on_contacts
 from ringsweep.models.ring.impact.mode import (
     BOTH,
     NONE,
-    RING,
-    angle_when_closed,
-    closed_mode,
     coefficients_there,
     distances_to_edges,
     frame,
@@ -45,17 +42,16 @@ _ON_EDGE = 1e-8
 
 @audit.violation.implements(ImpactRing)
 def _violation(scene, mode, forcing, y, rates, s, tolerance):
-    if mode.open == NONE:
-        phi = angle_when_closed(y[0], mode.turned)
-        return audit.violation(
-            ring_of(scene, mode.turned), closed_mode(mode), forcing, (phi, y[1]), (rates[0], rates[1]), s, tolerance
-        )
+    contacts = mode.contacts
+    if contacts.open == NONE:
+        closed = ring_of(scene, contacts.turned)
+        return audit.violation(closed, mode, forcing, (y[0], y[1]), (rates[0], rates[1]), s, tolerance)
     motion, largest = motion_of(scene, y, forcing[1]), 0.0
     allowed = scene.balls.reach * (_GAP_ROUNDING + tolerance)
     for contact in (1, 2):
-        if (contact == 1 or ring.contact_count(scene.closed.body) == 2) and mode.open & contact:
+        if (contact == 1 or ring.contact_count(scene.closed.body) == 2) and contacts.open & contact:
             largest = larger(largest, -contact_of(scene.balls, contact, motion).gap / allowed)
-    if mode.open == BOTH:
+    if contacts.open == BOTH:
         return largest, 0.0
     violation, power = _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance)
     return larger(largest, violation), power
@@ -111,7 +107,7 @@ _MOST_VIOLATION = 1e-9
 
 @audit.is_reaction.implements(ImpactRing)
 def _is_reaction(scene, guard):
-    return audit.is_reaction(scene.closed, guard - RING)
+    return audit.is_reaction(scene.closed, guard)
 
 
 @audit.undecided.implements(ImpactRing)

@@ -6,7 +6,7 @@ While both contacts hold, the steps are those of the closed ring. In a pivot the
 
 from __future__ import annotations
 
-from math import inf, pi, sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import inlined
@@ -16,7 +16,6 @@ from ringsweep.models.ring.impact.mode import (
     FIRST,
     NONE,
     TURNED,
-    closed_mode,
     coefficients_there,
     distances_to_edges,
     frame,
@@ -66,11 +65,6 @@ class Motion(NamedTuple):
     load_2: float
 
 
-@inlined
-def _closed_state(mode, x):
-    return (x[0] - pi if mode.turned == 1 else x[0]), x[1]
-
-
 @implicit.to_implicit.implements(ImpactRing)
 def _to_implicit(scene, forcing, y):
     return y[0] - forcing[0], y[1], y[2], y[3], y[-1]
@@ -83,7 +77,7 @@ def _from_implicit(scene, forcing, x):
 
 @implicit.common.implements(ImpactRing)
 def _common(scene, mode, forcing, x):
-    return implicit.common(ring_of(scene, mode.turned), closed_mode(mode), forcing, _closed_state(mode, x))
+    return implicit.common(ring_of(scene, mode.contacts.turned), mode, forcing, (x[0], x[1]))
 
 
 @implicit.is_stiff.implements(ImpactRing)
@@ -179,13 +173,11 @@ def _derivative(scene, f, friction, found, state, forcing):
 @implicit.guards_and_motion.implements(ImpactRing)
 def _guards_and_motion(scene, mode, common, forcing, x):
     body, psi = scene.closed.body, x[0] + forcing[0]
-    if mode.open == NONE:
+    if mode.contacts.open == NONE:
         guards, (_, omega, epsilon, _) = implicit.guards_and_motion(
-            ring_of(scene, mode.turned), closed_mode(mode), common, forcing, _closed_state(mode, x)
+            ring_of(scene, mode.contacts.turned), mode, common, forcing, (x[0], x[1])
         )
         determinant, slow, normal_1, normal_2, ahead, fast = guards
-        if mode.turned == 1:
-            normal_1, normal_2 = normal_2, normal_1
         load = 0.05 * body.mass * (body.gravity + body.radius * omega * omega)
         near = 0.02 * ring.free_determinant(body)
         found = Motion(psi, omega, epsilon, normal_1, normal_2, 0.0, 0.0, x[4], near, load, load)
@@ -197,7 +189,7 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     ahead = (above + _BEYOND) * (below + _BEYOND) if above < inf else inf
     load = 0.05 * body.mass * pivot.size(f)
     near = 0.02 * inertia(body)
-    if mode.open == FIRST:
+    if mode.contacts.open == FIRST:
         found = Motion(psi, f.psi_dot, psi_dd, 0.0, normal, gap, 0.0, x[4], near, 0.0, load)
         return (determinant, speed - low, gap, normal, ahead, high - speed), found
     found = Motion(psi, f.psi_dot, psi_dd, normal, 0.0, 0.0, gap, x[4], near, load, 0.0)

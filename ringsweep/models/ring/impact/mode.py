@@ -9,19 +9,17 @@ tells what the others are:
   has all its digits, and the angular velocity ``d psi/dt = (v + rho eta_dot)/R + d theta/dt`` is that of both contacts
   while eta_dot is zero;
 - flight: ``(psi, d psi/dt, x, dx/dt, y, dy/dt, gap_1, gap_2)``, with the place of the centre of mass. It tells the
-  measures of both gaps, see :data:`GAP_1`, too, but not with all digits of small ones.
+  measures of both gaps, see :data:`ringsweep.models.ring.series.GAP_1`, too, but not with all digits of small ones.
 """
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import cos, sin
 from typing import NamedTuple
 
 from ringsweep.compile import inlined, replacing
-from ringsweep.models.ring.series import FAST
-from ringsweep.models.ring.series import Mode as ClosedMode
+from ringsweep.models.ring.series import Mode, with_contacts
 from ringsweep.numerics.clock import parts
-from ringsweep.numerics.terms import FACTOR_ROWS
 from ringsweep.physics import ring
 from ringsweep.physics.impact import inertia, side_of
 from ringsweep.physics.pivot import Frame
@@ -34,17 +32,6 @@ TURNED = 4
 
 #: Kinds of events: a contact opens; it rebounds in an impact; it closes in an impact, or in the limit of its rebounds.
 NO_EVENT, OPENS, REBOUNDS, CLOSES = range(4)
-
-# Rows of the table of series before those of the closed ring: KIND holds the code of the state; GAP_1 and GAP_2 are
-# ``(rho^2 - |c|^2)/(2 rho)``, a measure of the gap that has a series; ETA belongs to a pivot; X and Y are the centre of
-# mass in a flight, and u and w of a pivot.
-KIND, GAP_1, GAP_2, ETA, X, Y, SPARE, OTHER = range(8)
-#: Groups of products of a pivot that grow side by side, and their rows.
-GROUPS, PRODUCTS = 4, 8
-#: First row of the table of the closed ring.
-RING = PRODUCTS + GROUPS * FACTOR_ROWS
-#: Number of rows.
-ROWS = RING + FAST + 1
 
 
 class Event(NamedTuple):
@@ -78,16 +65,13 @@ class Event(NamedTuple):
     passed: int
 
 
-class Mode(NamedTuple):
-    """Mode of a body that may leave the race.
+class Contacts(NamedTuple):
+    """Contacts of a body that may leave the race.
 
     Attributes
     ----------
-    sign, region, entry_guard, place_1, place_2
-        As in :class:`ringsweep.models.ring.series.Mode`; in a pivot those of the contact that holds. An open contact
-        keeps its last place.
     open : int
-        NONE, FIRST, SECOND or BOTH.
+        NONE, FIRST, SECOND or BOTH. In a pivot the slip of the mode is that of the contact that holds.
     turned : int
         1 if the contacts have changed their order along the race, else 0.
     zeros_1, zeros_2 : int
@@ -97,11 +81,6 @@ class Mode(NamedTuple):
         The last event.
     """
 
-    sign: int
-    region: int
-    entry_guard: int
-    place_1: tuple[int, int]
-    place_2: tuple[int, int]
     open: int
     turned: int
     zeros_1: int
@@ -122,26 +101,18 @@ def opens(contact, number, t):
 
 
 @inlined
-def make(sign, region, entry_guard, places, contacts, zeros, event):
-    """Mode from its parts; `places`, `contacts` (open, turned), and `zeros` are pairs."""
-    return Mode(sign, region, entry_guard, *places, *contacts, *zeros, event)
-
-
-@inlined
 def in_flight(places, turned, zeros, event):
     """Mode of a body without contacts."""
-    return make(1, 0, -1, places, (BOTH, turned), zeros, event)
+    return Mode(1, 0, -1, places[0], places[1], Contacts(BOTH, turned, zeros[0], zeros[1], event))
 
 
-#: Mode with another slip, and with other zeros of the gaps.
-with_slip, with_zeros = replacing("sign", "region", "entry_guard"), replacing("zeros_1", "zeros_2")
-_with_first, _with_second = replacing("place_1"), replacing("place_2")
+_with_zeros, _with_first, _with_second = replacing("zeros_1", "zeros_2"), replacing("place_1"), replacing("place_2")
 
 
 @inlined
-def code_of(mode):
-    """Code of the states of a mode."""
-    return float(mode.open + TURNED * mode.turned)
+def with_zeros(mode, zeros):
+    """Mode with other zeros of the gaps."""
+    return with_contacts(mode, _with_zeros(mode.contacts, *zeros))
 
 
 @inlined
@@ -151,52 +122,33 @@ def ring_of(scene, turned):
 
 
 @inlined
-def closed_mode(mode):
-    """Mode for the ring whose contacts are named in the order in which they stand."""
-    entry_guard = mode.entry_guard - RING if mode.entry_guard >= 0 else -1
-    if mode.turned == 1:
-        return ClosedMode(mode.sign, mode.region, entry_guard, mode.place_2, mode.place_1)
-    return ClosedMode(mode.sign, mode.region, entry_guard, mode.place_1, mode.place_2)
+def state_when_closed(psi, v, turned):
+    """State of a body whose contacts hold."""
+    return psi, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(TURNED * turned)
 
 
 @inlined
-def from_closed(found, turned, event):
-    """Mode from one of the ring whose contacts are named in the order in which they stand."""
-    entry_guard = found.entry_guard + RING if found.entry_guard >= 0 else -1
-    places = (found.place_2, found.place_1) if turned == 1 else (found.place_1, found.place_2)
-    return make(found.sign, found.region, entry_guard, places, (NONE, turned), (0, 0), event)
-
-
-@inlined
-def angle_when_closed(psi, turned):
-    """Angle of the centre of mass while both contacts hold, rad."""
-    return psi - pi if turned == 1 else psi
-
-
-@inlined
-def delta_when_closed(body, contact, turned):
+def delta_when_closed(scene, contact, turned):
     """Angle from the ball of a contact to the body, at which the other contact closes, rad."""
-    beta = ring.contact_offset(body)
-    beta = pi - beta if turned == 1 else beta
-    return beta if contact == 1 else -beta
+    return side_of(contact) * ring.contact_offset(ring_of(scene, turned).body)
 
 
 @inlined
 def holding(mode):
     """The contact that holds in a pivot: 1 or 2."""
-    return 2 if mode.open == FIRST else 1
+    return 2 if mode.contacts.open == FIRST else 1
 
 
 @inlined
 def place_of(mode):
     """Segment and turn of the contact that holds in a pivot."""
-    return mode.place_2 if mode.open == FIRST else mode.place_1
+    return mode.place_2 if mode.contacts.open == FIRST else mode.place_1
 
 
 @inlined
 def with_place(mode, place):
     """Mode of a pivot whose contact that holds is at another place."""
-    return _with_second(mode, place) if mode.open == FIRST else _with_first(mode, place)
+    return _with_second(mode, place) if mode.contacts.open == FIRST else _with_first(mode, place)
 
 
 @inlined
@@ -210,7 +162,7 @@ def frame(scene, y, ring_omega):
     """Place and rates of the pivot in the state `y`."""
     body, balls, code = scene.closed.body, scene.balls, int(y[-1] + 0.5)
     contact = 2 if code % TURNED == FIRST else 1
-    delta = delta_when_closed(body, contact, code // TURNED) + y[2]
+    delta = delta_when_closed(scene, contact, code // TURNED) + y[2]
     alpha, psi_dot = y[0] - delta, (y[1] + balls.reach * y[3]) / body.radius + ring_omega
     a, h, s, c, alpha_dot = side_of(contact) * balls.half_distance, balls.offset, sin(delta), cos(delta), psi_dot - y[3]
     of_body = body.mass, inertia(body), body.gravity, balls.radius, balls.reach
@@ -222,7 +174,7 @@ def frame(scene, y, ring_omega):
 def gap_measure(scene, mode, eta):
     """Measure ``(rho^2 - |c|^2)/(2 rho)`` of the gap in a pivot, m: the smallest gap has all its digits."""
     contact, side = holding(mode), side_of(holding(mode))
-    beta, turn = side * delta_when_closed(scene.closed.body, contact, mode.turned), 0.5 * side * eta
+    beta, turn = side * delta_when_closed(scene, contact, mode.contacts.turned), 0.5 * side * eta
     return 4.0 * scene.balls.half_distance * cos(beta + turn) * sin(turn)
 
 
@@ -233,7 +185,7 @@ def angle_at_gap(scene, contact, turned, gap, near):
     `near` is this angle, but has lost digits. Where the gap hardly changes with the angle, it is as good as the gap.
     """
     side, full = side_of(contact), 4.0 * scene.balls.half_distance
-    beta, turn = side * delta_when_closed(scene.closed.body, contact, turned), 0.5 * side * near
+    beta, turn = side * delta_when_closed(scene, contact, turned), 0.5 * side * near
     slope = full * cos(beta + 2.0 * turn)
     if abs(slope) > gap:
         turn -= (full * cos(beta + turn) * sin(turn) - gap) / slope

@@ -65,7 +65,7 @@ class SingleContactImpact(SingleContactRing):
         return Balls(body.radius, nothing, nothing, nothing)
 
     def turned(self, body: Any, balls: Balls) -> Any:
-        """Bodies after their contacts have changed places."""
+        """Bodies whose contacts have changed places."""
         return body
 
 
@@ -90,5 +90,6 @@ class RingImpact(SingleContactImpact, Ring):
         return Balls(body.radius - r, r, values["body.half_distance"], values["body.center_offset"])
 
     def turned(self, body: Any, balls: Balls) -> Any:
-        """Bodies whose centre of mass is as far on the other side of the line of the balls."""
-        return ring.completed(body._replace(xi=balls.reach * body.cos_beta - balls.offset))
+        """Bodies whose contacts have changed places: seen from the body, the axis is on the other side."""
+        xi = balls.offset - balls.reach * body.cos_beta
+        return ring.completed(body._replace(xi=xi, beta=np.pi - body.beta, cos_beta=-body.cos_beta))

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from math import pi
-
 from ringsweep.models.interface import simpler
-from ringsweep.models.ring.impact.mode import KIND, NONE, RING, angle_when_closed, closed_mode, code_of, ring_of
-from ringsweep.models.ring.impact.record import begin, renamed, with_base
-from ringsweep.models.ring.series import NORMAL_1, NORMAL_2, PHI
-from ringsweep.numerics.series import ORDER
+from ringsweep.models.ring.impact.mode import NONE, ring_of, state_when_closed
+from ringsweep.models.ring.impact.record import with_base
+from ringsweep.models.ring.series import KIND
 from ringsweep.physics.impact import ImpactRing
 
 
@@ -19,38 +16,16 @@ def _kind(scene):
 
 @simpler.is_simpler.implements(ImpactRing)
 def _is_simpler(scene, mode):
-    return mode.open == NONE
-
-
-@simpler.first_row.implements(ImpactRing)
-def _first_row(scene):
-    return RING
+    return mode.contacts.open == NONE
 
 
 @simpler.part.implements(ImpactRing)
-def _part(scene, mode, y):
-    return ring_of(scene, mode.turned), closed_mode(mode), (angle_when_closed(y[0], mode.turned), y[1])
-
-
-@simpler.part_of_record.implements(ImpactRing)
-def _part_of_record(scene, record, mode):
-    return renamed(record.base, -pi) if mode.turned == 1 else record.base
-
-
-@simpler.begun.implements(ImpactRing)
-def _begun(scene, part_record):
-    return begin(part_record)
+def _part(scene, record, mode, y):
+    return ring_of(scene, mode.contacts.turned), record.base, (y[0], y[1])
 
 
 @simpler.rejoined.implements(ImpactRing)
-def _rejoined(scene, record, mode, guard, part_record, y, c):
-    psi, base = y[0], part_record
-    c[KIND, 0] = code_of(mode)
-    if mode.turned == 1:
-        psi, base = y[0] + pi, renamed(part_record, pi)
-        guard = RING + NORMAL_2 if guard == RING + NORMAL_1 else RING + NORMAL_1 if guard == RING + NORMAL_2 else guard
-        # Rows bear the names of the contacts, not their order.
-        c[RING + PHI, 0] += pi
-        for k in range(ORDER + 1):
-            c[RING + NORMAL_1, k], c[RING + NORMAL_2, k] = c[RING + NORMAL_2, k], c[RING + NORMAL_1, k]
-    return guard, with_base(record, base), (psi, y[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, code_of(mode))
+def _rejoined(scene, record, mode, part_record, y, c):
+    state = state_when_closed(y[0], y[1], mode.contacts.turned)
+    c[KIND, 0] = state[-1]
+    return with_base(record, part_record), state

@@ -7,16 +7,14 @@ from math import cos, inf, isnan
 from ringsweep.compile import inlined
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.ring.impact.mode import (
-    RING,
     coefficients_there,
     delta_when_closed,
     frame,
     holding,
     place_of,
     with_place,
-    with_slip,
 )
-from ringsweep.models.ring.series import EQUAL, SLOW
+from ringsweep.models.ring.series import EQUAL, SLOW, with_slip
 from ringsweep.physics import drives
 from ringsweep.physics.friction.velocity import friction_in, region_at, stiction_band
 from ringsweep.physics.impact import side_of
@@ -65,7 +63,8 @@ def begun(scene, t, y, stick, stick_end):
     least = _ROUNDING * body.mass * size(f)
     # The other contact, if it touches and does not move yet, must open by its acceleration.
     touches = y[2] == 0.0 and y[3] == 0.0
-    arm = 2.0 * scene.balls.half_distance * side_of(contact) * cos(delta_when_closed(body, contact, stick.turned))
+    delta = delta_when_closed(scene, contact, stick.contacts.turned)
+    arm = 2.0 * scene.balls.half_distance * side_of(contact) * cos(delta)
     shut = -_SHUT * size(f)
     if v == 0.0 and stiction_band(scene.law) == 0.0:
         mu_s, _, _ = coefficients_there(scene, place_of(stick))
@@ -77,7 +76,7 @@ def begun(scene, t, y, stick, stick_end):
         region = region_at(scene.law, 0.0)
         best, best_mode, several = -inf, stick, False
         for sign in (1, -1):
-            slip = _slipping(scene, stick, y, rho, (sign, region, RING + SLOW))
+            slip = _slipping(scene, stick, y, rho, (sign, region, SLOW))
             K, _ = friction(scene, slip, 0.0)
             found = in_slip(f, K)
             psi_dd, alpha_dd, normal, _ = found
@@ -96,7 +95,7 @@ def begun(scene, t, y, stick, stick_end):
     if v == 0.0:
         # Friction is zero here, so that the ball slides in the direction in which the other forces accelerate it.
         sign = 1 if sliding_acceleration(f, in_slip(f, 0.0), carried) >= 0.0 else -1
-        entry_guard = RING + SLOW
+        entry_guard = SLOW
     slip = _slipping(scene, stick, y, rho, (sign, region, entry_guard))
     K, _ = friction(scene, slip, v)
     return (RUNNING if determinant(f, K) > 0.0 else JAM), slip

@@ -83,13 +83,6 @@ _COUNTS = Lost._fields.index("separations")
 OUTCOMES = ("open_time", "flight_time", "gap_max", *Lost._fields[_COUNTS:], "aftermath", "word", "impact_violation")
 
 
-@inlined
-def begin(base):
-    """Record at the beginning of a run, from the record of the motion."""
-    nothing = Lost(0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
-    return Record(base, 0.0, 0.0, 0.0, nothing)
-
-
 #: Record with another record of the motion.
 with_base = replacing("base")
 _with_lost = replacing("lost")
@@ -97,7 +90,8 @@ _with_lost = replacing("lost")
 
 @recorder.begin.implements(ImpactRing)
 def _begin(scene, t, seen):
-    return begin(recorder.begin(scene.closed, t, seen[:5]))
+    nothing = Lost(0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
+    return Record(recorder.begin(scene.closed, t, seen[:5]), 0.0, 0.0, 0.0, nothing)
 
 
 @recorder.observe.implements(ImpactRing)
@@ -114,17 +108,6 @@ def _enter(scene, record, t, seen):
     return with_base(record, recorder.enter(scene.closed, record.base, t, seen[:5]))
 
 
-_with_angles = replacing("lowest", "highest", "phi_min", "phi_max")
-_with_normals = replacing("normal_min_1", "normal_min_2", "normal_max_1", "normal_max_2")
-
-
-@inlined
-def renamed(base, shift):
-    """Record of the motion with angles that are greater by `shift`, rad, and with the contacts exchanged."""
-    b = _with_normals(base, base.normal_min_2, base.normal_min_1, base.normal_max_2, base.normal_max_1)
-    return _with_angles(b, b.lowest + shift, b.highest + shift, b.phi_min + shift, b.phi_max + shift)
-
-
 @inlined
 def _count(contacts):
     return float(contacts % 2 + contacts // 2)
@@ -132,25 +115,26 @@ def _count(contacts):
 
 @recorder.after_event.implements(ImpactRing)
 def _after_event(scene, record, before, mode, t):
-    r, event = record.lost, mode.event
+    r, contacts = record.lost, mode.contacts
+    event = contacts.event
     if event.number == r.number:
         return record
     # An impact may close all contacts, of which some open at once.
     passes = event.passed > 0
     opened = NONE if passes else int(r.open)
     # Contacts that held and are open now.
-    lost = float((1 if mode.open % 2 == 1 and opened % 2 == 0 else 0) + (2 if mode.open >= 2 and opened < 2 else 0))
+    lost = float(contacts.open & ~opened)
     if ring.contact_count(scene.closed.body) == 1:
         lost = min(lost, 1.0)
     is_impact = event.kind in (REBOUNDS, CLOSES)
-    recovers = mode.open == NONE and opened != NONE
+    recovers = contacts.open == NONE and opened != NONE
     hit = event.contact if is_impact else 0
     # All contacts touch when those that were open hit, whatever they do afterwards.
-    turned = float(mode.turned) if is_impact and hit == r.open else r.turned
-    code = float(1 + event.kind + 4 * (hit + 4 * (mode.open + 4 * (mode.turned + 2 * event.passed))))
+    turned = float(contacts.turned) if is_impact and hit == r.open else r.turned
+    code = float(1 + event.kind + 4 * (hit + 4 * (contacts.open + 4 * (contacts.turned + 2 * event.passed))))
     is_first = r.first == 0.0 and lost > 0.0
     found = Lost(
-        float(mode.open),
+        float(contacts.open),
         turned,
         t if is_first else r.t_first,
         lost if is_first else r.first,
@@ -164,7 +148,7 @@ def _after_event(scene, record, before, mode, t):
         max(r.impulse_max, event.impulse),
         r.impact_loss + event.loss,
         r.tumbles + (1.0 if turned != r.turned else 0.0),
-        t + event.lasts if recovers else nan if mode.open != NONE else r.t_recovered,
+        t + event.lasts if recovers else nan if contacts.open != NONE else r.t_recovered,
     )
     return _with_lost(record, found)
 

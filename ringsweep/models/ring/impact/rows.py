@@ -23,14 +23,15 @@ EVENT = ("number", "time", "event", "contact", "speed", "impulse")
 def row_of(scene, mode, forcing, y, seen):
     """Row of the state `y`, of which the recorder is shown `seen`."""
     psi, rate, normal_1, normal_2, located = seen[0], seen[1], seen[2], seen[3], seen[4]
-    event, (theta, ring_omega, _) = mode.event, forcing
+    contacts, (theta, ring_omega, _) = mode.contacts, forcing
+    event = contacts.event
     motion = motion_of(scene, y, ring_omega)
     first = contact_of(scene.balls, 1, motion)
     second = contact_of(scene.balls, 2, motion) if ring.contact_count(scene.closed.body) == 2 else first
     # On an edge the mode knows on which side of it a contact rubs.
     surface = scene.closed.surface
-    segment_1 = locate(surface, first.alpha - theta)[0] if mode.open % 2 == 1 else mode.place_1[0]
-    segment_2 = locate(surface, second.alpha - theta)[0] if mode.open >= 2 else mode.place_2[0]
+    segment_1 = locate(surface, first.alpha - theta)[0] if contacts.open % 2 == 1 else mode.place_1[0]
+    segment_2 = locate(surface, second.alpha - theta)[0] if contacts.open >= 2 else mode.place_2[0]
     _, _, zone_1 = coefficients(surface, segment_1)
     _, _, zone_2 = coefficients(surface, segment_2)
     return (
@@ -42,11 +43,11 @@ def row_of(scene, mode, forcing, y, seen):
         ring_omega,
         zone_1,
         zone_2,
-        0.0 if mode.open == BOTH or mode.region < 0 else float(mode.sign),
+        0.0 if contacts.open == BOTH or mode.region < 0 else float(mode.sign),
         motion.x,
         motion.y,
-        first.gap if mode.open % 2 == 1 else 0.0,
-        second.gap if mode.open >= 2 else 0.0,
+        first.gap if contacts.open % 2 == 1 else 0.0,
+        second.gap if contacts.open >= 2 else 0.0,
         float(event.number),
         event.time,
         float(event.kind),

@@ -1,10 +1,8 @@
 """Power series of a body that has left the race: those of a pivot, and of a flight.
 
-The table has the rows of the closed ring behind rows of its own; while both contacts hold, the closed ring fills these.
-In a pivot and in a flight the rows of the angle, of
-the angular velocity and acceleration, of the sliding velocity and of the guards keep their meaning; the guard of a
-contact is its normal reaction while it holds, and its gap while it is open. A gap that has just opened begins with
-coefficients that are zero; its guard is the series divided by that power of the time.
+The rows of the table are those of :mod:`ringsweep.models.ring.series`. The guard of a contact is its normal reaction
+while it holds, and its gap while it is open. A gap that has just opened begins with coefficients that are zero; its
+guard is the series divided by that power of the time.
 """
 
 from __future__ import annotations
@@ -16,45 +14,40 @@ from ringsweep.models.interface import series
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.ring.impact.mode import (
     BOTH,
-    ETA,
     FIRST,
-    GAP_1,
-    GAP_2,
-    KIND,
     NONE,
-    OTHER,
-    PRODUCTS,
-    RING,
-    ROWS,
-    SPARE,
     TURNED,
-    Mode,
-    X,
-    Y,
-    code_of,
     coefficients_there,
     distances_to_edges,
     frame,
     gap_measure,
     holding,
     place_of,
-    with_slip,
+    ring_of,
 )
 from ringsweep.models.ring.series import (
     DETERMINANT,
     EDGE,
     EPSILON,
+    ETA,
     FACTORS,
     FAST,
+    GAP_1,
+    GAP_2,
+    KIND,
     LEAST_DETERMINANT,
     NORMAL_1,
     NORMAL_2,
     OMEGA,
+    OTHER,
     PHI,
     SLOW,
+    SPARE,
     SQUARE,
     THETA,
     V,
+    X,
+    Y,
 )
 from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds, level_at_breakaway, rate_at_rest, speed_in
 from ringsweep.numerics.series import (
@@ -89,18 +82,20 @@ _ON_EDGE = 1e-12
 
 @series.table_shape.implements(ImpactRing)
 def _table_shape(scene):
-    return ROWS, RING + DETERMINANT
+    return series.table_shape(scene.closed)
 
 
 @series.expand.implements(ImpactRing)
 def _expand(scene, mode, t, y, tolerance, c):
-    c[KIND, 0] = code_of(mode)
-    drives.expand_at(scene.drive, t, ORDER + 2, c[RING + THETA], c[RING + FACTORS :])
-    if mode.open == BOTH:
+    c[KIND, 0] = y[-1]
+    if mode.contacts.open == NONE:
+        return series.expand(ring_of(scene, mode.contacts.turned), mode, t, (y[0], y[1]), tolerance, c)
+    drives.expand_at(scene.drive, t, ORDER + 2, c[THETA], c[FACTORS:])
+    if mode.contacts.open == BOTH:
         return _expand_flight(scene, mode, y, tolerance, c)
     # Guards of what ends slip or stick, unless they are filled below.
     for g in (DETERMINANT, SLOW, EDGE, FAST):
-        _fill_constant(c[RING + g], inf)
+        _fill_constant(c[g], inf)
     return _expand_pivot(scene, mode, t, y, tolerance, c)
 
 
@@ -117,9 +112,9 @@ def _fill_constant(row, number):
 @inlined
 def _expand_pivot(scene, mode, t, y, tolerance, c):
     body, balls = scene.closed.body, scene.balls
-    fresh = (mode.zeros_1 if mode.open == FIRST else mode.zeros_2) if y[2] == 0.0 else 0
-    c[RING + PHI, 0], c[RING + V, 0], c[ETA, 0] = y[0], y[1], y[2]
-    f = frame(scene, (y[0], y[1], y[2], 0.0 if fresh > 1 else y[3], *y[4:]), c[RING + THETA, 1])
+    fresh = (mode.contacts.zeros_1 if mode.contacts.open == FIRST else mode.contacts.zeros_2) if y[2] == 0.0 else 0
+    c[PHI, 0], c[V, 0], c[ETA, 0] = y[0], y[1], y[2]
+    f = frame(scene, (y[0], y[1], y[2], 0.0 if fresh > 1 else y[3], *y[4:]), c[THETA, 1])
     sharpness = _expand_pivot_motion(scene, mode, f, fresh, c)
     _expand_pivot_guards(scene, mode, f, y[2], fresh, c)
     per_angle = 1.0 / tolerance
@@ -127,12 +122,12 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     per_load = 1.0 / REACTION_TOLERANCE * per_angle
     if varies(scene.law, mode.region):
         per_load = max(per_load, 1e3)
-    load = pivot.size(f) + balls.reach * abs(c[RING + EPSILON, 0])
-    own = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
-    motion = (RING + PHI, per_angle), (ETA, per_angle), (RING + V, per_angle / speed)
-    loads = (RING + EPSILON, per_load * balls.reach / load), (own, per_load / (body.mass * load))
+    load = pivot.size(f) + balls.reach * abs(c[EPSILON, 0])
+    own = NORMAL_2 if mode.contacts.open == FIRST else NORMAL_1
+    motion = (PHI, per_angle), (ETA, per_angle), (V, per_angle / speed)
+    loads = (EPSILON, per_load * balls.reach / load), (own, per_load / (body.mass * load))
     h = step_within(c, (*motion, *loads))
-    return shorten_for_decay(sharpness, c[RING + V], h), h
+    return shorten_for_decay(sharpness, c[V], h), h
 
 
 @inlined
@@ -144,26 +139,26 @@ def _expand_pivot_motion(scene, mode, f, fresh, c):
     :mod:`ringsweep.physics.pivot`.
     """
     law, race, slips, sign = scene.law, scene.closed.body.radius, mode.sign != 0, float(mode.sign)
-    own_row = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
+    own_row = NORMAL_2 if mode.contacts.open == FIRST else NORMAL_1
     mu_s, mu_k, _ = coefficients_there(scene, place_of(mode))
     surfaces = mu_s, mu_k
-    (mu,), begun, sharpness = begin_series(law, mode.region, sign * c[RING + V, 0], surfaces)
+    (mu,), begun, sharpness = begin_series(law, mode.region, sign * c[V, 0], surfaces)
     K_0 = -sign * mu if slips else 0.0
-    solution = pivot.in_slip(f, K_0) if slips else pivot.in_stick(f, race * (2.0 * c[RING + THETA, 2]))
+    solution = pivot.in_slip(f, K_0) if slips else pivot.in_stick(f, race * (2.0 * c[THETA, 2]))
     psi_dd, alpha_dd, N_0, F_0 = solution
     # The lever of the force at the contact about the centre of mass, in slip.
     q_0 = f.radius - f.u
     lever_0 = f.w - K_0 * q_0
     if fresh == 3:
         alpha_dd = psi_dd
-    c[RING + OMEGA, 0], c[RING + EPSILON, 0], c[RING + SQUARE, 0] = f.psi_dot, psi_dd, f.psi_square
+    c[OMEGA, 0], c[EPSILON, 0], c[SQUARE, 0] = f.psi_dot, psi_dd, f.psi_square
     c[own_row, 0] = N_0
     if slips:
         least = LEAST_DETERMINANT * f.inertia if varies(law, mode.region) else 0.0
-        c[RING + DETERMINANT, 0] = pivot.determinant(f, K_0) - least
+        c[DETERMINANT, 0] = pivot.determinant(f, K_0) - least
     else:
         # Forward slip begins where friction against it no longer suffices.
-        c[RING + SLOW, 0], c[RING + FAST, 0] = mu_s * N_0 + F_0, mu_s * N_0 - F_0
+        c[SLOW, 0], c[FAST, 0] = mu_s * N_0 + F_0, mu_s * N_0 - F_0
     om_before, ad_before = f.psi_dot, f.alpha_dot
     own = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     before_law, of_law = joined(own, pivot.NO_PRODUCTS), no_products(law, surfaces)
@@ -171,10 +166,10 @@ def _expand_pivot_motion(scene, mode, f, fresh, c):
     first = newest = no_factors(joined(before_law, of_law))
     for k in range(1, ORDER + 1):
         om, ad, K, v = psi_dd * INVERSE[k], alpha_dd * INVERSE[k], 0.0, 0.0
-        inner = inner_products(c, PRODUCTS, k, first, newest)
+        inner = inner_products(c, FACTORS, k, first, newest)
         i_sa, i_ca, i_u, i_w, i_om, i_ad, i_KN, i_Ku, i_wl = part_from(inner, own, ())
         if slips:
-            v = f.reach * ad + f.radius * om - race * ((k + 1.0) * c[RING + THETA, k + 1])
+            v = f.reach * ad + f.radius * om - race * ((k + 1.0) * c[THETA, k + 1])
             (mu,), law_left, law_right = series_term(
                 law, mode.region, k, sign * v, part_from(inner, of_law, before_law), begun, surfaces
             )
@@ -187,18 +182,18 @@ def _expand_pivot_motion(scene, mode, f, fresh, c):
         lever = w - K * q_0 + K_0 * u + i_Ku
         if slips:
             found = pivot.solved_in_slip(f, K_0, (*rest, i_KN + K * N_0))
-            c[RING + DETERMINANT, k] = f.mass * (i_wl + w * lever_0 + f.w * lever)
+            c[DETERMINANT, k] = f.mass * (i_wl + w * lever_0 + f.w * lever)
         else:
-            found = pivot.solved_in_stick(f, (*rest, -race * ((k + 1.0) * (k + 2.0) * c[RING + THETA, k + 2])))
-            c[RING + SLOW, k], c[RING + FAST, k] = mu_s * found[2] + found[3], mu_s * found[2] - found[3]
+            found = pivot.solved_in_stick(f, (*rest, -race * ((k + 1.0) * (k + 2.0) * c[THETA, k + 2])))
+            c[SLOW, k], c[FAST, k] = mu_s * found[2] + found[3], mu_s * found[2] - found[3]
         psi_dd, alpha_dd, N, _ = found
         left, right = pivot.left_factors(f, change, found), pivot.right_factors(f, change, found)
         left = joined((ad_before, ad_before, dd_before, dd_before, om, ad, K, K, w), left)
         right = joined((c_a, s_a, w, u, om, ad, N, u, lever), right)
-        newest = set_factors(c, PRODUCTS, k, joined(left, law_left), joined(right, law_right))
+        newest = set_factors(c, FACTORS, k, joined(left, law_left), joined(right, law_right))
         first = newest if k == 1 else first
-        c[RING + PHI, k], c[RING + OMEGA, k], c[RING + V, k] = om_before * INVERSE[k], om, v
-        c[RING + EPSILON, k], c[RING + SQUARE, k], c[own_row, k] = psi_dd, change[4], N
+        c[PHI, k], c[OMEGA, k], c[V, k] = om_before * INVERSE[k], om, v
+        c[EPSILON, k], c[SQUARE, k], c[own_row, k] = psi_dd, change[4], N
         c[ETA, k], c[X, k], c[Y, k] = dd_before * INVERSE[k], u, w
         om_before, ad_before = om, ad
     return sharpness if slips else 0.0
@@ -208,18 +203,18 @@ def _expand_pivot_motion(scene, mode, f, fresh, c):
 def _expand_pivot_guards(scene, mode, f, eta, fresh, c):
     """Fill the gap of the open contact and its guard; in slip also the ends of the region and of the zone."""
     a, h = side_of(holding(mode)) * scene.balls.half_distance, scene.balls.offset
-    gap, guard = (GAP_1, RING + NORMAL_1) if mode.open == FIRST else (GAP_2, RING + NORMAL_2)
+    gap, guard = (GAP_1, NORMAL_1) if mode.contacts.open == FIRST else (GAP_2, NORMAL_2)
     set_terms(c[gap], (terms(c[Y]) * h - terms(c[X]) * a) * (2.0 * a / (a * a + h * h)))
     c[gap, 0] = gap_measure(scene, mode, eta)
     _divide(c, gap, guard, fresh)
-    _expand_edges(scene, mode, f.alpha - c[RING + THETA, 0], c)
+    _expand_edges(scene, mode, f.alpha - c[THETA, 0], c)
     if mode.sign == 0:
         return
     body = scene.closed.body
-    size = pivot.size(f) + body.radius * (abs(c[RING + EPSILON, 0]) + 2.0 * abs(c[RING + THETA, 2]))
+    size = pivot.size(f) + body.radius * (abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
     bounds = region_bounds(scene.law, mode.region)
-    expand_bounds(c, (RING + V, RING + SLOW, RING + FAST), mode, bounds)
-    level_at_breakaway(c, RING + SLOW, mode, bounds[0], size)
+    expand_bounds(c, (V, SLOW, FAST), mode, bounds)
+    level_at_breakaway(c, SLOW, mode, bounds[0], size)
 
 
 @inlined
@@ -235,7 +230,7 @@ def _expand_edges(scene, mode, rho, c):
     near, far, sense = (above, below, -1.0) if above <= below else (below, above, 1.0)
     c[SPARE, 0], shift = near, 0
     for k in range(1, ORDER + 1):
-        c[SPARE, k] = sense * (c[RING + PHI, k] - c[ETA, k] - c[RING + THETA, k])
+        c[SPARE, k] = sense * (c[PHI, k] - c[ETA, k] - c[THETA, k])
     if near <= _ON_EDGE:
         shift = 1
         while shift < ORDER and c[SPARE, shift] == 0.0:
@@ -245,7 +240,7 @@ def _expand_edges(scene, mode, rho, c):
         total = c[OTHER, k] * far
         for j in range(k):
             total -= c[OTHER, j] * c[SPARE, k - j]
-        c[RING + EDGE, k] = total
+        c[EDGE, k] = total
 
 
 @inlined
@@ -268,11 +263,11 @@ def _expand_flight(scene, mode, y, tolerance, c):
     for row in (X, Y):
         _fill_constant(c[row], 0.0)
     for row in (PHI, V, OMEGA, EPSILON, SQUARE, DETERMINANT, SLOW, NORMAL_2, EDGE, FAST):
-        _fill_constant(c[RING + row], inf if row >= DETERMINANT else 0.0)
+        _fill_constant(c[row], inf if row >= DETERMINANT else 0.0)
     c[X, 0], c[X, 1] = x, x_dot
     c[Y, 0], c[Y, 1], c[Y, 2] = y_0, y_dot, -0.5 * body.gravity
-    c[RING + PHI, 0], c[RING + PHI, 1], c[RING + OMEGA, 0] = psi, spin, spin
-    c[RING + SQUARE, 0] = spin * spin
+    c[PHI, 0], c[PHI, 1], c[OMEGA, 0] = psi, spin, spin
+    c[SQUARE, 0] = spin * spin
     two = ring.contact_count(body) == 2
     speed = sqrt(x_dot * x_dot + y_dot * y_dot) + sqrt(body.gravity * balls.reach)
     h = 4.0 * balls.reach / speed if speed > 0.0 else inf
@@ -283,8 +278,8 @@ def _expand_flight(scene, mode, y, tolerance, c):
         h = 0.1 * h * max(distance / balls.reach, 0.05)
     last = previous = 0.0
     for contact, gap, guard, zeros, now in (
-        (1, GAP_1, RING + NORMAL_1, mode.zeros_1, y[6]),
-        (2, GAP_2, RING + NORMAL_2, mode.zeros_2, y[7]),
+        (1, GAP_1, NORMAL_1, mode.contacts.zeros_1, y[6]),
+        (2, GAP_2, NORMAL_2, mode.contacts.zeros_2, y[7]),
     ):
         if contact == 1 or two:
             _expand_gap(scene, contact, psi, spin, c, gap)
@@ -340,7 +335,7 @@ def _polar(scene, c, s):
     x, y, x_dot, y_dot = value(c[X], s), value(c[Y], s), slope(c[X], s), slope(c[Y], s)
     square = x * x + y * y
     angle = atan2(x, -y)
-    angle += 2.0 * pi * round((c[RING + PHI, 0] - angle) / (2.0 * pi))
+    angle += 2.0 * pi * round((c[PHI, 0] - angle) / (2.0 * pi))
     rate = (x * y_dot - y * x_dot) / square
     return angle, rate, -(scene.closed.body.gravity * x + 2.0 * (x * x_dot + y * y_dot) * rate) / square
 
@@ -348,23 +343,23 @@ def _polar(scene, c, s):
 @series.state_at.implements(ImpactRing)
 def _state_at(scene, c, s):
     contacts, code = int(c[KIND, 0]) % TURNED, c[KIND, 0]
-    psi = value(c[RING + PHI], s)
+    psi = value(c[PHI], s)
     if contacts == NONE:
-        return psi, value(c[RING + V], s), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, code
+        return psi, value(c[V], s), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, code
     if contacts == BOTH:
-        rate = c[RING + OMEGA, 0]
+        rate = c[OMEGA, 0]
         if _is_particle_in_flight(scene, contacts):
             psi, rate, _ = _polar(scene, c, s)
         gap_2 = value(c[GAP_2], s) if ring.contact_count(scene.closed.body) == 2 else 0.0
         place = value(c[X], s), slope(c[X], s), value(c[Y], s), slope(c[Y], s)
         return psi, rate, *place, value(c[GAP_1], s), gap_2, code
-    return psi, value(c[RING + V], s), value(c[ETA], s), slope(c[ETA], s), 0.0, 0.0, 0.0, 0.0, code
+    return psi, value(c[V], s), value(c[ETA], s), slope(c[ETA], s), 0.0, 0.0, 0.0, 0.0, code
 
 
 @series.rates_at.implements(ImpactRing)
 def _rates_at(scene, c, s):
     contacts = int(c[KIND, 0]) % TURNED
-    psi_dot = slope(c[RING + PHI], s)
+    psi_dot = slope(c[PHI], s)
     if contacts == BOTH:
         return psi_dot, 0.0, slope(c[X], s), 0.0, slope(c[Y], s), -scene.closed.body.gravity, 0.0, 0.0, 0.0
     eta_dot = eta_dd = 0.0
@@ -372,7 +367,7 @@ def _rates_at(scene, c, s):
         eta_dot = slope(c[ETA], s)
         differentiate(c[ETA], c[SPARE])
         eta_dd = slope(c[SPARE], s)
-    return psi_dot, slope(c[RING + V], s), eta_dot, eta_dd, 0.0, 0.0, 0.0, 0.0, 0.0
+    return psi_dot, slope(c[V], s), eta_dot, eta_dd, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @inlined
@@ -386,12 +381,12 @@ def _seen(scene, c, s):
     """What the recorder is shown: psi, its rate, both reactions, the acceleration, both gaps, and the open contacts."""
     body = scene.closed.body
     contacts = int(c[KIND, 0]) % TURNED
-    psi, rate, acceleration = _value(c[RING + PHI], s), _value(c[RING + OMEGA], s), _value(c[RING + EPSILON], s)
+    psi, rate, acceleration = _value(c[PHI], s), _value(c[OMEGA], s), _value(c[EPSILON], s)
     if _is_particle_in_flight(scene, contacts):
         psi, rate, acceleration = _polar(scene, c, s)
     open_1, open_2 = contacts % 2 == 1, contacts >= 2
-    normal_1 = 0.0 if open_1 else _value(c[RING + NORMAL_1], s)
-    normal_2 = 0.0 if open_2 else _value(c[RING + NORMAL_2], s)
+    normal_1 = 0.0 if open_1 else _value(c[NORMAL_1], s)
+    normal_2 = 0.0 if open_2 else _value(c[NORMAL_2], s)
     gap_1, gap_2 = _value(c[GAP_1], s) if open_1 else 0.0, _value(c[GAP_2], s) if open_2 else 0.0
     if ring.contact_count(body) == 1:
         normal_2, gap_2 = normal_1, 0.0
@@ -413,22 +408,22 @@ def _seen_at(scene, mode, c, s, h):
 def _extremes(scene, record, mode, c, h, work):
     base, count = record.base, 0
     for row, is_open in (
-        (GAP_1, mode.open % 2 == 1),
-        (GAP_2, mode.open >= 2 and ring.contact_count(scene.closed.body) == 2),
+        (GAP_1, mode.contacts.open % 2 == 1),
+        (GAP_2, mode.contacts.open >= 2 and ring.contact_count(scene.closed.body) == 2),
     ):
         if is_open and c[row, 0] + variation(c[row], h) > record.gap_max:
             differentiate(c[row], c[SPARE])
             count = crossings(c[SPARE], h, work, count)
-    if mode.open == BOTH:
+    if mode.contacts.open == BOTH:
         return count
-    omega, change = c[RING + OMEGA, 0], variation(c[RING + OMEGA], h)
+    omega, change = c[OMEGA, 0], variation(c[OMEGA], h)
     if abs(omega) <= change:
-        count = crossings(c[RING + OMEGA], h, work, count)
+        count = crossings(c[OMEGA], h, work, count)
     if abs(omega) <= change or omega - change < base.omega_min or omega + change > base.omega_max:
-        count = crossings(c[RING + EPSILON], h, work, count)
-    own, lowest, highest = RING + NORMAL_1, base.normal_min_1, base.normal_max_1
-    if mode.open == FIRST:
-        own, lowest, highest = RING + NORMAL_2, base.normal_min_2, base.normal_max_2
+        count = crossings(c[EPSILON], h, work, count)
+    own, lowest, highest = NORMAL_1, base.normal_min_1, base.normal_max_1
+    if mode.contacts.open == FIRST:
+        own, lowest, highest = NORMAL_2, base.normal_min_2, base.normal_max_2
     change = variation(c[own], h)
     if c[own, 0] - change < lowest or c[own, 0] + change > highest:
         differentiate(c[own], c[SPARE])
@@ -441,8 +436,3 @@ def true_gap(scene, measure):
     """Gap, m, from its measure ``(rho^2 - |c|^2)/(2 rho)``."""
     rho = scene.balls.reach
     return 2.0 * rho * measure / (rho + sqrt(max(rho * (rho - 2.0 * measure), 0.0)))
-
-
-@series.after_first_step.implements(Mode)
-def _after_first_step(mode):
-    return with_slip(mode, mode.sign, mode.region, -1)

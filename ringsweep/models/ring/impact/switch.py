@@ -23,37 +23,43 @@ from ringsweep.models.ring.impact.mode import (
     NO_EVENT,
     NONE,
     REBOUNDS,
-    RING,
     SECOND,
     TURNED,
+    Contacts,
     Event,
-    Mode,
     angle_at_gap,
-    angle_when_closed,
-    closed_mode,
-    code_of,
     coefficients_there,
     delta_when_closed,
     distances_to_edges,
     frame,
-    from_closed,
     gap_measure,
     holding,
     in_flight,
-    make,
     opens,
     place_of,
     ring_of,
+    state_when_closed,
     with_lasts,
     with_passed,
     with_place,
-    with_slip,
     with_zeros,
 )
-from ringsweep.models.ring.series import DETERMINANT, EDGE, FAST, NEARLY_JAMMED, NORMAL_1, NORMAL_2, SLOW, leaves_behind
+from ringsweep.models.ring.series import (
+    DETERMINANT,
+    EDGE,
+    NEARLY_JAMMED,
+    NORMAL_1,
+    NORMAL_2,
+    SLOW,
+    Mode,
+    leaves_behind,
+    slip_after,
+    with_contacts,
+    with_slip,
+)
 from ringsweep.numerics.clock import Instant, parts
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.velocity import KINETIC, friction_at, region_bounds
+from ringsweep.physics.friction.velocity import KINETIC, friction_at
 from ringsweep.physics.impact import (
     Contact,
     ImpactRing,
@@ -93,18 +99,18 @@ _TOGETHER, _ROUNDING = 1e-12, 1e-15
 @inlined
 def motion_of(scene, y, ring_omega):
     """Motion of the body in space."""
-    closed, balls = scene.closed.body, scene.balls
     code = int(y[-1] + 0.5)
     contacts, turned = code % TURNED, code // TURNED
     if contacts == NONE:
-        phi, omega = angle_when_closed(y[0], turned), ring.angular_velocity(closed, y[1], ring_omega)
-        distance = balls.reach * cos(ring.contact_offset(closed)) + (1.0 - 2.0 * turned) * balls.offset
-        s, c = distance * sin(phi), distance * cos(phi)
+        closed = ring_of(scene, turned).body
+        omega = ring.angular_velocity(closed, y[1], ring_omega)
+        distance = scene.balls.reach * cos(ring.contact_offset(closed)) + scene.balls.offset
+        s, c = distance * sin(y[0]), distance * cos(y[0])
         return Motion(y[0], omega, s, omega * c, -c, omega * s)
     if contacts == BOTH:
         return Motion(y[0], y[1], y[2], y[3], y[4], y[5])
     f = frame(scene, y, ring_omega)
-    out, along = balls.reach + f.u, balls.reach * f.alpha_dot + f.u * f.psi_dot
+    out, along = f.reach + f.u, f.reach * f.alpha_dot + f.u * f.psi_dot
     inwards = f.w * f.psi_dot
     return Motion(
         y[0],
@@ -124,18 +130,6 @@ def state_in_flight(motion, turned, gaps):
 
 
 @inlined
-def _separated(scene, status, turned):
-    """Contacts that a status of the closed ring opens, by their own names; NONE if it opens none."""
-    if status == SEPARATED_BOTH or (status == SEPARATED_1 and ring.contact_count(scene.closed.body) == 1):
-        return BOTH
-    if status == SEPARATED_1:
-        return SECOND if turned == 1 else FIRST
-    if status == SEPARATED_2:
-        return FIRST if turned == 1 else SECOND
-    return NONE
-
-
-@inlined
 def _presses(scene, contact, motion):
     """Whether a free body closes the gap of a contact that touches."""
     gravity = scene.closed.body.gravity
@@ -147,38 +141,35 @@ def _presses(scene, contact, motion):
 def _opened(scene, t, y, before, which, zeros, event):
     """Status, mode and state after contacts of a closed ring have opened; `y` and `before` are its state and mode."""
     _, ring_omega, _ = drives.turn(scene.drive, t)
-    places, turned = (before.place_1, before.place_2), before.turned
+    turned = before.contacts.turned
     if which != BOTH:
         state = y[0], y[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(which + TURNED * turned)
-        contact = 2 if which == FIRST else 1
-        if turned == 1 and contact == 2:
-            # In the frame of a pivot this contact stands a revolution ahead of its angle in the closed ring.
-            places = places[0], (places[1][0], places[1][1] + 1)
-        empty = (zeros, 0) if which == FIRST else (0, zeros)
+        zeros_1, zeros_2 = (zeros, 0) if which == FIRST else (0, zeros)
+        opened = with_contacts(before, Contacts(which, turned, zeros_1, zeros_2, event))
         if load(frame(scene, state, ring_omega)) > 0.0:
-            stick = make(0, KINETIC, -1, places, (which, turned), empty, event)
-            status, mode = pivot.begun(scene, t, state, stick, 0)
+            status, mode = pivot.begun(scene, t, state, with_slip(opened, 0, KINETIC, -1), 0)
             return status, mode, state
-        motion = motion_of(scene, state, ring_omega)
-        if _presses(scene, 3 - contact, motion):
+        if _presses(scene, which, motion_of(scene, state, ring_omega)):
             # Neither contact can carry the body alone, and without both the one that is lost would close again.
-            return JAM, make(1, 0, -1, places, (which, turned), empty, event), state
-    closed = y[0], y[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(TURNED * turned)
-    state = state_in_flight(motion_of(scene, closed, ring_omega), turned, (0.0, 0.0))
-    return RUNNING, in_flight(places, turned, (zeros, zeros), event), state
+            return JAM, opened, state
+    state = state_in_flight(motion_of(scene, y, ring_omega), turned, (0.0, 0.0))
+    return RUNNING, in_flight((before.place_1, before.place_2), turned, (zeros, zeros), event), state
 
 
 @inlined
-def _after_closed(scene, status, mode, t, y, zeros, is_new):
-    """Status, mode and state from status and mode of the closed ring; `y` is the pair of psi and v.
+def _after_closed(scene, t, found, zeros, is_new):
+    """Status, mode and state from those that the closed ring has found.
 
     `is_new` is whether the last event is the impact that has just closed the contacts.
     """
-    which, event = _separated(scene, status, mode.turned), mode.event
-    if which != NONE:
-        lost = with_passed(event, 1) if is_new else opens(which, event.number, t)
-        return _opened(scene, t, y, mode, which, zeros, lost)
-    return status, mode, (y[0], y[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, code_of(mode))
+    status, mode, y = found
+    if status not in (SEPARATED_1, SEPARATED_2, SEPARATED_BOTH):
+        return found
+    which, event = status - SEPARATED_1 + 1, mode.contacts.event
+    if ring.contact_count(scene.closed.body) == 1:
+        which = BOTH
+    lost = with_passed(event, 1) if is_new else opens(which, event.number, t)
+    return _opened(scene, t, y, mode, which, zeros, lost)
 
 
 @modes.initial_state.implements(ImpactRing)
@@ -195,25 +186,32 @@ def _taken_along(scene, t, wedged):
     All accelerations are in proportion to that of the ring, and so are the velocities that they leave.
     """
     status, mode, y = wedged
-    if mode.open == NONE:
+    contacts = mode.contacts
+    if contacts.open == NONE:
         return wedged
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     carried = scene.closed.body.radius * ring_epsilon
     psi_dd, alpha_dd, _, _ = in_stick(frame(scene, y, ring_omega), carried)
     state = y[0], y[1], y[2], (psi_dd - alpha_dd) / ring_epsilon * ring_omega, *y[4:]
-    return status, with_zeros(mode, min(mode.zeros_1, 1), min(mode.zeros_2, 1)), state
+    return status, with_zeros(mode, (min(contacts.zeros_1, 1), min(contacts.zeros_2, 1))), state
+
+
+@inlined
+def _closed(scene, t, psi, v, turned, event):
+    """Status, mode and state of a body all of whose contacts touch, if none opens."""
+    status, mode = modes.initial_mode(ring_of(scene, turned), t, (psi, v))
+    return status, with_contacts(mode, Contacts(NONE, turned, 0, 0, event)), state_when_closed(psi, v, turned)
 
 
 @inlined
 def _start(scene, t, phi, v):
-    status, found = modes.initial_mode(scene.closed, t, (phi, v))
-    mode = from_closed(found, 0, Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, parts(t)[0], 0))
+    found = _closed(scene, t, phi, v, 0, Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, parts(t)[0], 0))
     if leaves_behind(scene.drive, scene.closed, t, v):
-        wedged = _after_closed(scene, status, mode, t, (phi, 0.0), 2, False)
+        wedged = _after_closed(scene, t, (*found[:2], state_when_closed(phi, 0.0, 0)), 2, False)
         # A body that is wedged on one contact is taken along.
         if wedged[0] == RUNNING and wedged[1].sign == 0:
             return _taken_along(scene, t, wedged)
-    return _after_closed(scene, status, mode, t, (phi, v), 2, False)
+    return _after_closed(scene, t, found, 2, False)
 
 
 @modes.initial_mode.implements(ImpactRing)
@@ -225,20 +223,15 @@ def _initial_mode(scene, t, y):
 
 @modes.switch.implements(ImpactRing)
 def _switch(scene, mode, guard, t, y):
-    guard = guard - RING
-    if mode.open == NONE:
-        turned = mode.turned
-        own = guard
-        if turned == 1 and guard in (NORMAL_1, NORMAL_2):
-            own = NORMAL_2 if guard == NORMAL_1 else NORMAL_1
-        state = angle_when_closed(y[0], turned), y[1]
-        status, found, (_, v) = modes.switch(ring_of(scene, turned), closed_mode(mode), own, t, state)
+    contacts = mode.contacts
+    if contacts.open == NONE:
+        status, after, (_, v) = modes.switch(ring_of(scene, contacts.turned), mode, guard, t, (y[0], y[1]))
         zeros = 3 if guard in (NORMAL_1, NORMAL_2) else 2
-        return _after_closed(scene, status, from_closed(found, turned, mode.event), t, (y[0], v), zeros, False)
+        return _after_closed(scene, t, (status, after, (y[0], v, *y[2:])), zeros, False)
     if guard == DETERMINANT:
         return _jammed(scene, mode, y[1]), mode, y
     reaches_1, reaches_2 = guard == NORMAL_1, guard == NORMAL_2
-    if mode.open == BOTH:
+    if contacts.open == BOTH:
         return _lands(scene, mode, 1 if reaches_1 else 2, t, y)
     if reaches_1 or reaches_2:
         contact = 1 if reaches_1 else 2
@@ -248,9 +241,10 @@ def _switch(scene, mode, guard, t, y):
         motion = motion_of(scene, y, ring_omega)
         if _presses(scene, contact, motion):
             return JAM, mode, y
-        zeros = _remaining(mode, y, (3, mode.zeros_2) if contact == 1 else (mode.zeros_1, 3))
-        flight = in_flight((mode.place_1, mode.place_2), mode.turned, zeros, opens(contact, mode.event.number, t))
-        return RUNNING, flight, state_in_flight(motion, mode.turned, _gaps_in_pivot(scene, mode, y))
+        zeros = _remaining(mode, y, (3, contacts.zeros_2) if contact == 1 else (contacts.zeros_1, 3))
+        opened = opens(contact, contacts.event.number, t)
+        flight = in_flight((mode.place_1, mode.place_2), contacts.turned, zeros, opened)
+        return RUNNING, flight, state_in_flight(motion, contacts.turned, _gaps_in_pivot(scene, mode, y))
     return _on_one_contact(scene, mode, guard, t, y)
 
 
@@ -269,7 +263,7 @@ def _jammed(scene, mode, v):
 def _gaps_in_pivot(scene, mode, y):
     """Measures of both gaps in a pivot, m."""
     gap = gap_measure(scene, mode, y[2])
-    return (gap, 0.0) if mode.open == FIRST else (0.0, gap)
+    return (gap, 0.0) if mode.contacts.open == FIRST else (0.0, gap)
 
 
 @inlined
@@ -277,37 +271,27 @@ def _remaining(mode, y, zeros):
     """Zeros of both gaps: those of the contact that was open before are zeros no more once the gap has grown."""
     if y[2] == 0.0:
         return zeros
-    return (0, zeros[1]) if mode.open == FIRST else (zeros[0], 0)
+    return (0, zeros[1]) if mode.contacts.open == FIRST else (zeros[0], 0)
 
 
 @inlined
 def _on_one_contact(scene, mode, guard, t, y):
     """What follows in a pivot after an edge, at the bounds of a region of the law, at rest, and at breakaway."""
-    v, at_rest = y[1], (y[0], 0.0, *y[2:])
-    sign, region = mode.sign, mode.region
+    v, stick_end, (mu_s, _, _) = y[1], 0, coefficients_there(scene, place_of(mode))
     if guard == EDGE:
         mode = with_place(mode, _beyond_nearer_edge(scene, mode, t, y))
-    mode = with_zeros(mode, *_remaining(mode, y, (mode.zeros_1, mode.zeros_2)))
-    stick = with_slip(mode, 0, KINETIC, -1)
-    if sign == 0:
-        return _begun(scene, t, at_rest, stick, 0 if guard == EDGE else 1 if guard == SLOW else -1)
-    entry_guard, (low, high) = RING + SLOW if v == 0.0 else -1, region_bounds(scene.law, region)
-    # A formula may jump at the bound of a region.
-    if guard == FAST:
-        region, entry_guard, v = region + 1, RING + SLOW, sign * high
-    elif guard == SLOW and low > 0.0:
-        region, entry_guard, v = region - 1, RING + FAST, sign * low
-    if guard != SLOW or low > 0.0:
-        found, state = with_slip(mode, sign, region, entry_guard), (y[0], v, *y[2:])
-        _, ring_omega, _ = drives.turn(scene.drive, t)
-        K, _ = pivot.friction(scene, found, v)
-        denominator = determinant(frame(scene, state, ring_omega), K)
-        return (RUNNING if denominator > 0.0 else BROKEN if isnan(denominator) else JAM), found, state
-    mu_s, _, _ = coefficients_there(scene, place_of(mode))
-    # A contact that nothing holds passes through rest.
-    if region < 0 or mu_s == 0.0:
-        return RUNNING, with_slip(mode, -sign, region, RING + SLOW), at_rest
-    return _begun(scene, t, at_rest, stick, 0)
+    mode = with_zeros(mode, _remaining(mode, y, (mode.contacts.zeros_1, mode.contacts.zeros_2)))
+    if mode.sign == 0:
+        stick_end = 0 if guard == EDGE else 1 if guard == SLOW else -1
+    else:
+        mode, v = slip_after(scene.law, mode, guard, v, mu_s)
+    if mode.sign == 0:
+        return _begun(scene, t, (y[0], 0.0, *y[2:]), mode, stick_end)
+    state = y[0], v, *y[2:]
+    _, ring_omega, _ = drives.turn(scene.drive, t)
+    K, _ = pivot.friction(scene, mode, v)
+    denominator = determinant(frame(scene, state, ring_omega), K)
+    return (RUNNING if denominator > 0.0 else BROKEN if isnan(denominator) else JAM), mode, state
 
 
 @inlined
@@ -323,13 +307,14 @@ def _begun(scene, t, y, stick, stick_end):
     """Status, mode and state of a pivot whose sliding velocity is zero; it may turn into a flight."""
     status, found = pivot.begun(scene, t, y, stick, stick_end)
     _, ring_omega, _ = drives.turn(scene.drive, t)
-    contact, turned = holding(stick), stick.turned
+    contact, contacts = holding(stick), stick.contacts
     # Friction in stick may have pressed the ball against the race: when it drops, the contact opens.
     if status == JAM and not load(frame(scene, y, ring_omega)) > 0.0:
-        zeros = (2, stick.zeros_2) if contact == 1 else (stick.zeros_1, 2)
-        flight = in_flight((stick.place_1, stick.place_2), turned, zeros, opens(contact, stick.event.number, t))
+        zeros = (2, contacts.zeros_2) if contact == 1 else (contacts.zeros_1, 2)
+        opened = opens(contact, contacts.event.number, t)
+        flight = in_flight((stick.place_1, stick.place_2), contacts.turned, zeros, opened)
         motion = motion_of(scene, y, ring_omega)
-        return RUNNING, flight, state_in_flight(motion, turned, _gaps_in_pivot(scene, stick, y))
+        return RUNNING, flight, state_in_flight(motion, contacts.turned, _gaps_in_pivot(scene, stick, y))
     return status, found, y
 
 
@@ -438,8 +423,9 @@ def _lands(scene, mode, hit, t, y):
         return BROKEN if tried.solutions != 1 else JAM, mode, y
     lasts = _rocking_ends(scene, mode, t, tried)
     if lasts > 0.0:
-        rests = _close(scene, t, tried.state[0], tried.state[1], tried.mode.turned, with_lasts(tried.mode.event, lasts))
-        if rests[0] == RUNNING and rests[1].open == NONE:
+        contacts = tried.mode.contacts
+        rests = _close(scene, t, tried.state[0], tried.state[1], contacts.turned, with_lasts(contacts.event, lasts))
+        if rests[0] == RUNNING and rests[1].contacts.open == NONE:
             return rests
     return tried.status, tried.mode, tried.state
 
@@ -451,13 +437,13 @@ def _landing(scene, mode, hit, t, y):
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     motion = motion_of(scene, y, ring_omega)
     # Velocities relative to the race keep their digits in the slowest impacts: the contacts move as one body.
-    relative = relative_to_race(motion, ring_omega) if mode.open == BOTH else motion_of(scene, y, 0.0)
+    relative = relative_to_race(motion, ring_omega) if mode.contacts.open == BOTH else motion_of(scene, y, 0.0)
     two = ring.contact_count(scene.closed.body) == 2
     first = contact_of(balls, 1, relative)
     second = contact_of(balls, 2, relative) if two else first
     hits_1, hits_2 = hit == 1, hit == 2
     holds_1 = holds_2 = False
-    if mode.open == BOTH:
+    if mode.contacts.open == BOTH:
         first, second = _with_gap(first, y[6]), _with_gap(second, y[7])
         if two:
             hits_1 = hits_1 or _closes_within(_TOGETHER, mode, t, first)
@@ -473,7 +459,7 @@ def _landing(scene, mode, hit, t, y):
 @inlined
 def _closes_within(share, mode, t, contact):
     """Whether a contact closes within this share of the time since the last event."""
-    return contact.opening < 0.0 and contact.gap <= -share * contact.opening * (parts(t)[0] - mode.event.time)
+    return contact.opening < 0.0 and contact.gap <= -share * contact.opening * (parts(t)[0] - mode.contacts.event.time)
 
 
 @inlined
@@ -508,7 +494,7 @@ def _try(scene, mode, t, y, landing, hits, restitution, lasts):
         found.loss,
         found.violation,
         lasts,
-        mode.event.number + 1,
+        mode.contacts.event.number + 1,
         parts(t)[0],
         0,
     )
@@ -523,14 +509,15 @@ def _try(scene, mode, t, y, landing, hits, restitution, lasts):
 @inlined
 def _falls(scene, mode, t, y, motion, contact):
     """Acceleration with which the gap of an open contact closes, m/s^2; 0 if the contact holds."""
-    body, balls = scene.closed.body, scene.balls
-    if mode.open == BOTH:
-        return -free_gap_acceleration(balls, contact, motion, body.gravity)
-    if mode.open != contact:
+    balls = scene.balls
+    if mode.contacts.open == BOTH:
+        return -free_gap_acceleration(balls, contact, motion, scene.closed.body.gravity)
+    if mode.contacts.open != contact:
         return 0.0
     psi_dd, alpha_dd, _, _ = pivot.acceleration(scene, mode, t, y)
     # The measure of this gap is arm*sin(delta) plus a constant. At a gap of zero both have the same rate.
-    arm, delta = 2.0 * side_of(holding(mode)) * balls.half_distance, delta_when_closed(body, holding(mode), mode.turned)
+    delta = delta_when_closed(scene, holding(mode), mode.contacts.turned)
+    arm = 2.0 * side_of(holding(mode)) * balls.half_distance
     rate = arm * cos(delta) * y[3]
     return arm * (sin(delta) * y[3] * y[3] - cos(delta) * (psi_dd - alpha_dd)) - rate * rate / balls.reach
 
@@ -560,8 +547,8 @@ def _rocking_ends(scene, mode, t, tried):
     The contact that had held opens with a speed, and hits with the same speed again. The ratio of it to the speed of
     its last hit is that of one rock to the one before. Hops last as long as they are fast.
     """
-    last = mode.event
-    if mode.open + tried.mode.open != BOTH or mode.open == NONE or mode.open == BOTH or tried.status != RUNNING:
+    last, before = mode.contacts.event, mode.contacts.open
+    if before + tried.mode.contacts.open != BOTH or before in (NONE, BOTH) or tried.status != RUNNING:
         return 0.0
     contact = holding(mode)
     if last.kind != CLOSES or last.contact != contact or tried.rebounds[2 - contact]:
@@ -580,7 +567,8 @@ def _last_rebounds_end(scene, mode, t, y, motion, contact, speed):
     """Time until the rebounds of a contact end that hits with a speed which friction forbids; 0 if they go on."""
     # Where the rebounds of both contacts shrink together, those of one are summed while the other one is still open,
     # which hits before they would be over.
-    still = mode.event.time + mode.event.lasts - parts(t)[0] if mode.event.kind == CLOSES else 0.0
+    event = mode.contacts.event
+    still = event.time + event.lasts - parts(t)[0] if event.kind == CLOSES else 0.0
     falls = _falls(scene, mode, t, y, motion, contact)
     return max(still, _time_of_rebounds(falls, speed, 0.0, _FORBIDDEN * scene.balls.reach))
 
@@ -598,7 +586,7 @@ def _next(scene, t, motion, mode, impact, event):
         places = locate(scene.closed.surface, first.alpha - theta), places[1]
     if touched[1] and two:
         places = places[0], locate(scene.closed.surface, second.alpha - theta)
-    turned = mode.turned
+    turned = mode.contacts.turned
     if two and touched[0] and touched[1]:
         ahead = second.sine * first.cosine - second.cosine * first.sine
         turned = 1 if ahead < 0.0 else 0
@@ -619,7 +607,7 @@ def _next(scene, t, motion, mode, impact, event):
     delta = motion.psi - held.alpha
     delta = delta - 2.0 * pi * round(delta / (2.0 * pi))
     turned = 1 if cos(delta) < 0.0 else 0
-    away = delta - delta_when_closed(body, contact, turned)
+    away = delta - delta_when_closed(scene, contact, turned)
     away = away - 2.0 * pi * round(away / (2.0 * pi))
     along = (v + body.radius * ring_omega - balls.radius * motion.psi_dot) / balls.reach
     rate = motion.psi_dot - along
@@ -633,7 +621,7 @@ def _next(scene, t, motion, mode, impact, event):
     place = locate(scene.closed.surface, f.alpha - theta)
     places = (places[0], place) if contact == 2 else (place, places[1])
     if load(f) > 0.0:
-        stick = make(0, KINETIC, -1, places, (which, turned), zeros, event)
+        stick = Mode(0, KINETIC, -1, places[0], places[1], Contacts(which, turned, zeros[0], zeros[1], event))
         status, found_mode = pivot.begun(scene, t, state, stick, 0)
         return status, found_mode, state
     # The contact that has just closed opens again, without an impact.
@@ -644,17 +632,14 @@ def _next(scene, t, motion, mode, impact, event):
 @inlined
 def _close(scene, t, psi, v, turned, event):
     """Status, mode and state after all contacts have closed."""
-    status, found = modes.initial_mode(ring_of(scene, turned), t, (angle_when_closed(psi, turned), v))
-    return _after_closed(scene, status, from_closed(found, turned, event), t, (psi, v), 2, True)
+    return _after_closed(scene, t, _closed(scene, t, psi, v, turned, event), 2, True)
 
 
 @modes.status_when_stalled.implements(ImpactRing)
 def _status_when_stalled(scene, mode, t, y):
-    if mode.open == NONE:
-        return modes.status_when_stalled(
-            ring_of(scene, mode.turned), closed_mode(mode), t, (angle_when_closed(y[0], mode.turned), y[1])
-        )
-    if mode.open == BOTH or mode.sign == 0:
+    if mode.contacts.open == NONE:
+        return modes.status_when_stalled(ring_of(scene, mode.contacts.turned), mode, t, (y[0], y[1]))
+    if mode.contacts.open == BOTH or mode.sign == 0:
         return BROKEN
     _, ring_omega, _ = drives.turn(scene.drive, t)
     K, _ = pivot.friction(scene, mode, y[1])
@@ -665,12 +650,12 @@ def _status_when_stalled(scene, mode, t, y):
 
 @modes.sticks.implements(ImpactRing)
 def _sticks(scene, mode):
-    return mode.open == NONE and (mode.sign == 0 or mode.region < 0)
+    return mode.contacts.open == NONE and (mode.sign == 0 or mode.region < 0)
 
 
-@modes.first_loss.implements(Mode)
-def _first_loss(before, after):
-    return before.event.number == 0 and after.event.number > 0
+@modes.first_loss.implements(ImpactRing)
+def _first_loss(scene, before, after):
+    return before.contacts.event.number == 0 and after.contacts.event.number > 0
 
 
 @modes.in_space.implements(ImpactRing)
