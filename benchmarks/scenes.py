@@ -188,14 +188,11 @@ def compile_one(name: str, method: str) -> dict[str, Any]:
 
 
 def optional_in(functions: Iterable[Any]) -> dict[str, int]:
-    """Number of functions that belong to each optional thing, without what stands for its absence."""
+    """Number of functions that belong to each optional thing."""
     found = dict.fromkeys(OPTIONAL, 0)
     for one in functions:
-        hook = getattr(sys.modules.get(one.__module__), one.__name__, None)
-        # The body of a hook for types without one does nothing.
-        if getattr(hook, "__wrapped__", None) is not one:
-            for thing, modules in OPTIONAL.items():
-                found[thing] += any(f"{one.__module__}.".startswith(f"ringsweep.{name}.") for name in modules)
+        for thing, modules in OPTIONAL.items():
+            found[thing] += any(f"{one.__module__}.".startswith(f"ringsweep.{name}.") for name in modules)
     return found
 
 

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsweep.models.interface.shock import Unlocated
 from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, SEPARATED_1, SEPARATED_2
 from ringsweep.models.ring import record as record_module
 from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
@@ -19,9 +18,9 @@ begin, observe, conclude = record_module.begin, record_module.observe, record_mo
 
 def outcome(phi, omega, status=COMPLETE, normal_1=1.0, normal_2=1.0, stuck_for=0.0):
     """Outcome of a run through the states `phi` and `omega`."""
-    record = begin((phi[0], omega[0], normal_1, normal_2, Unlocated()), EPSILON)
+    record = begin((phi[0], omega[0], normal_1, normal_2, ()), EPSILON)
     for x, w in zip(phi[1:], omega[1:], strict=True):
-        record = observe(record, Unlocated(), stuck_for, (x, w, normal_1, normal_2, Unlocated()), EPSILON)
+        record = observe(record, (), stuck_for, (x, w, normal_1, normal_2, ()), EPSILON)
     return conclude(record, status, float(len(phi) - 1), phi[-1], omega[-1])
 
 
@@ -128,7 +127,7 @@ class TestEnd:
     @pytest.mark.parametrize("status", [COMPLETE, SEPARATED_1, JAM, BROKEN])
     @pytest.mark.parametrize(("phi", "omega"), [(nan, 0.0), (0.0, inf), (-inf, nan)])
     def test_run_that_ends_in_a_state_that_is_not_finite_is_failed(self, status, phi, omega):
-        found = conclude(begin((0.0, 1.0, 1.0, 1.0, Unlocated()), EPSILON), status, 1.0, phi, omega)
+        found = conclude(begin((0.0, 1.0, 1.0, 1.0, ()), EPSILON), status, 1.0, phi, omega)
         assert (found.regime, found.motion, found.separating_contact) == (FAILED, FAILED, 0)
         assert isnan(found.t_separation)
 

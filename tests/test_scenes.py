@@ -7,7 +7,6 @@ import pytest
 from benchmarks import scenes
 from benchmarks.work_precision import SCENES
 from ringsweep import config
-from ringsweep.models import tangent
 from ringsweep.runs import sweep
 from ringsweep.runs.executors import Execution
 from ringsweep.solvers import automaton
@@ -39,12 +38,6 @@ def test_kernel_calls_only_functions_that_its_scene_uses(code):
 def test_kernel_takes_no_function_from_what_its_scene_lacks(code):
     for one in code.values():
         assert one["optional"] == dict.fromkeys(scenes.OPTIONAL, 0)
-
-
-def test_functions_of_an_optional_thing_are_counted_but_not_those_that_stand_for_its_absence():
-    stub, body = tangent.begin.__wrapped__, tangent.begin.body_of(tangent.Exponent)
-    assert scenes.optional_in([stub])["exponent"] == 0
-    assert scenes.optional_in([stub, body])["exponent"] == 1
 
 
 def test_sampled_sweep_runs_the_kernels_of_the_plain_one():

@@ -1,8 +1,8 @@
 """Compilation with Numba: options, cache, and the choice of function bodies by type.
 
 :func:`kernel` decorates a function that Python calls. :func:`inlined` decorates a formula that kernels call, and
-:func:`absorbed` a formula in the innermost loop. :func:`hook` decorates a function with one body for each type. Only
-this package and :mod:`ringsweep.numerics` use Numba.
+:func:`absorbed` a formula in the innermost loop. :func:`hook` decorates a function with one body for each type, and
+:func:`feature` one for what a scene may lack. Only this package and :mod:`ringsweep.numerics` use Numba.
 """
 
 from ringsweep.compile.cache import SOURCES_DIGEST, has_known_source, kernel
@@ -13,6 +13,7 @@ from ringsweep.compile.numba_private import borrowed
 from ringsweep.compile.options import absorbed, inlined, specialise
 from ringsweep.compile.tuples import (
     add_scaled,
+    feature,
     function_from_lines,
     generated,
     map_leaves,
@@ -28,6 +29,7 @@ __all__ = [
     "absorbed",
     "add_scaled",
     "borrowed",
+    "feature",
     "function_from_lines",
     "generated",
     "has_known_source",

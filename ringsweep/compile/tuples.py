@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from math import inf, nan
 from typing import Any
 
 from numba import types
@@ -71,6 +72,30 @@ def generated(write: Callable[..., Any]) -> Any:
     found = _stub(write, names, refuse)
     specialise(found, body)
     return found
+
+
+def feature(otherwise: str, *, absorb: bool = False) -> Any:
+    """Compile a formula for a feature: a part of a scene or of a record that may be missing.
+
+    Where it is missing, an empty tuple stands in place of the first argument, and kernels contain nothing of the
+    formula.
+
+    Parameters
+    ----------
+    otherwise : str
+        Result where the feature is missing: an expression of the arguments.
+    absorb : bool
+        Whether the formula is inlined whatever its size; see :func:`ringsweep.compile.absorbed`.
+    """
+
+    def decorate(body: Callable[..., Any]) -> Any:
+        names = list(inspect.signature(body).parameters)
+        without = function_from_lines(", ".join(names), [f"return {otherwise}"], {"inf": inf, "nan": nan})
+        found = _stub(body, names, lambda *arguments: (without if type(arguments[0]) is tuple else body)(*arguments))
+        specialise(found, lambda *kinds: without if kinds[0] == types.Tuple(()) else body, absorb=absorb)
+        return found
+
+    return decorate
 
 
 def map_leaves(change: Callable[[Any], Any], nested: Any) -> Any:

@@ -10,34 +10,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import hook, inlined, unrolled
+from ringsweep.compile import feature, inlined, unrolled
 from ringsweep.models import cycles
 from ringsweep.models.scene import Section
 from ringsweep.models.turn import turn_within
 from ringsweep.quantities.parameters import Leaf
 
-# A maximum counts if the body has moved farther towards it than this share of the range of its displacement.
-_ROUNDING = 1e-6
 
-
-class AtPeriod(NamedTuple):
-    """What a scene asks for: points at the end of each period of the forcing.
+class Asked(NamedTuple):
+    """What a scene asks for.
 
     Attributes
     ----------
+    at_turn : bool
+        Whether points lie at each maximum of the displacement, or at the end of each period of the forcing.
     keep : int
         Number of points that are kept.
     columns : int
         Number of columns that hold them: `keep` for the place, for the velocity, and for each deflection that is kept.
     """
 
-    keep: Leaf
-    columns: Leaf
-
-
-class AtTurn(NamedTuple):
-    """What a scene asks for: points at each maximum of the displacement; fields as in :class:`AtPeriod`."""
-
+    at_turn: Leaf
     keep: Leaf
     columns: Leaf
 
@@ -87,54 +80,44 @@ def columns(asked: Section | None, variables: tuple[str, ...]) -> tuple[str, ...
     return tuple(name for name in (variables if asked.deflections else variables[:2]) for _ in range(asked.keep))
 
 
-def field(asked: Section, variables: tuple[str, ...], cells: int) -> AtPeriod | AtTurn:
+def field(asked: Section, variables: tuple[str, ...], cells: int) -> Asked:
     """Field ``section`` of so many cells; arguments as in :func:`columns`."""
-    kind = AtPeriod if asked.at == "period" else AtTurn
-    return kind(np.full(cells, asked.keep), np.full(cells, len(columns(asked, variables))))
+    values = asked.at == "turn", asked.keep, len(columns(asked, variables))
+    return Asked(*(np.full(cells, value) for value in values))
 
 
-@hook(optional=True)
+@feature("()")
 def lent(asked, record, row, deflections):
     """Points at the beginning of a run; an empty tuple if no section is asked for.
 
     Parameters
     ----------
-    asked : AtPeriod or AtTurn
+    asked : Asked
     record : NamedTuple
         With the last observation, ``last``, and with ``cycles``.
     row : ndarray
         Row of outcomes of the run.
     deflections : tuple of float
-        NaN for each deflection, or one NaN without bristles.
+        NaN for each deflection that is observed.
     """
-    return ()
-
-
-@lent.implements(AtPeriod, AtTurn)
-def _lent(asked, record, row, deflections):
     for k in range(max(len(row) - asked.columns, 0), len(row)):
         row[k] = nan
     return Points(row, 0.0, deflections, record.last.x, 0.0, nan, deflections)
 
 
-@hook(optional=True)
+@feature("inf")
 def due(asked, record):
     """Time that a step must show the record, s; infinite if there is none."""
-    return inf
+    return inf if asked.at_turn else record.cycles.next
 
 
-@due.implements(AtPeriod)
-def _end_of_period(asked, record):
-    return record.cycles.next
-
-
-@hook(absorb=True, optional=True)
-def observe(asked, scene, r, cycles_now, now, deflections):
+@feature("()", absorb=True)
+def with_point(asked, scene, r, cycles_now, now, deflections, least_rise):
     """Points after an observation.
 
     Parameters
     ----------
-    asked : AtPeriod or AtTurn
+    asked : Asked
     scene, r : NamedTuple
         One cell, and its record before the observation, as in :func:`lent`.
     cycles_now : Cycles
@@ -143,12 +126,11 @@ def observe(asked, scene, r, cycles_now, now, deflections):
         The interval that ends with it.
     deflections : tuple of float
         Those at its end, m.
+    least_rise : float
+        Rise of the displacement before a maximum that counts, m.
     """
-    return ()
-
-
-@observe.implements(AtPeriod)
-def _at_period(asked, scene, r, cycles_now, now, deflections):
+    if asked.at_turn:
+        return _with_turn(asked, r, now, deflections, least_rise)
     p, mark = r.section, cycles_now.last
     count = p.number
     if scene.forcing_period < inf and cycles_now.count != r.cycles.count:
@@ -159,8 +141,8 @@ def _at_period(asked, scene, r, cycles_now, now, deflections):
     return Points(p.row, count, deflections, p.low, 0.0, nan, p.deflections_turn)
 
 
-@observe.implements(AtTurn)
-def _at_turn(asked, scene, r, cycles_now, now, deflections):
+@inlined
+def _with_turn(asked, r, now, deflections, least_rise):
     p = r.section
     count, pending, x_turn, deflections_turn = p.number, p.pending, p.x_turn, p.deflections_turn
     low = min(p.low, r.last.x)
@@ -172,7 +154,7 @@ def _at_turn(asked, scene, r, cycles_now, now, deflections):
         pending = 0.0
     elif now.velocity < 0.0 and pending > 0.0:
         pending = 0.0
-        if x_turn - low > max(r.play, _ROUNDING * (r.x_max - r.x_min)):
+        if x_turn - low > least_rise:
             _store(deflections_turn, asked, p, x_turn, 0.0)
             count, low = count + 1.0, x_turn
     return Points(p.row, count, deflections, low, pending, x_turn, deflections_turn)
@@ -201,22 +183,13 @@ def _store(length, deflections, asked, p, x, velocity):
     return lines
 
 
-@hook(optional=True)
-def finish(asked, scene, record):
+@feature("None")
+def put_in_order(asked, section):
     """Put the points into their order in time."""
-
-
-@finish.implements(AtPeriod, AtTurn)
-def _finish(asked, scene, record):
-    _order(asked, record.section.row, record.section.number)
-
-
-@inlined
-def _order(asked, row, count):
-    keep = asked.keep
-    if len(row) < asked.columns or count <= keep:
+    row, keep = section.row, asked.keep
+    if len(row) < asked.columns or section.number <= keep:
         return
-    oldest = int(count) % keep
+    oldest = int(section.number) % keep
     for first in range(len(row) - asked.columns, len(row), keep):
         # Both parts reversed, and then the whole, is the second part before the first.
         _reverse(row, first, first + oldest)

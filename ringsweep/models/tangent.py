@@ -5,12 +5,9 @@ from __future__ import annotations
 from math import acos, atan2, cos, exp, inf, isnan, log, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook, inlined, replacing, unrolled
-from ringsweep.models.interface.variation import Exponent
+from ringsweep.compile import feature, inlined, replacing, unrolled
 from ringsweep.numerics.collocation import stored, transition
 from ringsweep.numerics.terms import joined
-from ringsweep.physics.belt import Belt, BristleBelt
-from ringsweep.physics.ring import Ring
 
 #: Outcomes of a run whose exponent is asked for, after the others.
 OUTCOMES = (
@@ -151,7 +148,7 @@ def _scaled(length, vector, factor):
 
 @unrolled
 def _length(length, vector, frequency):
-    """Length of a disturbance, m/s; see :func:`frequency`."""
+    """Length of a disturbance, m/s; see :class:`ringsweep.models.interface.variation.Exponent`."""
     squares = ("vector[1] * vector[1]" if i == 1 else f"(frequency * vector[{i}]) ** 2" for i in range(length))
     return ["return sqrt(" + " + ".join(squares) + ")"]
 
@@ -241,44 +238,11 @@ def _of_cubic(trace, minors, determinant):
 # ---- the run ------------------------------------------------------------------------------------
 
 
-@hook(optional=True)
-def _disturbance(scene):
-    """A disturbance with components along each component of the state that count alike, see :func:`frequency`."""
-    return 1.0 / frequency(scene), 1.0
-
-
-@_disturbance.implements(BristleBelt)
-def _of_three(scene):
-    return 1.0 / frequency(scene), 1.0, 1.0 / frequency(scene)
-
-
-@hook(optional=True)
-def begin(asked, scene, t):
+@feature("()")
+def undisturbed(asked, scene, t):
     """Tangent at the beginning of a run; an empty tuple if no exponent is asked for."""
-    return ()
-
-
-@hook
-def frequency(scene):
-    """Velocity, m/s, that counts as much in a disturbance as a unit of the place, m or rad."""
-
-
-@frequency.implements(Belt, BristleBelt)
-def _frequency(scene):
-    natural = sqrt(abs(scene.body.stiffness) / scene.body.mass)
-    return max(natural, 2.0 * pi / min(scene.forcing_period, scene.span))
-
-
-@frequency.implements(Ring)
-def _frequency_on_ring(scene):
-    radius = scene.body.radius
-    return radius * max(sqrt(scene.body.gravity / radius), 2.0 * pi / min(scene.forcing_period, scene.span))
-
-
-@begin.implements(Exponent)
-def _begin(asked, scene, t):
-    vector = _disturbance(scene)
-    vector = _scaled(vector, 1.0 / _length(vector, frequency(scene)))
+    vector = asked.disturbance
+    vector = _scaled(vector, 1.0 / _length(vector, asked.frequency))
     zero, unit = _scaled(vector, 0.0), Flow(_unit(vector), 0.0)
     blocks = Blocks(-1.0, 0.0, 0.0, t, 0.0, t, 0.0, _SKIPPED * scene.span)
     multipliers = Multipliers(nan, nan, nan, nan, nan, nan, inf, inf)
@@ -315,18 +279,13 @@ def _is_pending(length, gradient):
     return ["return " + " or ".join(f"gradient[{i}] != 0.0" for i in range(length))]
 
 
-@hook(absorb=True, optional=True)
-def observe(tangent, scene, before, cycles, t, duration):
+@feature("tangent", absorb=True)
+def observed(tangent, scene, before, cycles, t, duration):
     """Tangent after an observation, from the cycles before and after it."""
-    return tangent
-
-
-@observe.implements(Tangent)
-def _observe(tangent, scene, before, cycles, t, duration):
     r = tangent
     lap = Flow(_product(r.vector, r.step.matrix, r.lap.matrix), r.lap.log_determinant + r.step.log_determinant)
     vector = _applied(r.vector, r.step.matrix)
-    length = _length(vector, frequency(scene))
+    length = _length(vector, scene.asked.frequency)
     growth = r.growth + logarithm(length)
     vector = _scaled(vector, 1.0 / length) if length > 0.0 else r.vector
     unit = Flow(_unit(vector), 0.0)
@@ -375,39 +334,24 @@ def _blocks(b, span, t, growth, ends):
     )
 
 
-@hook(optional=True)
+@feature("0.0")
 def largest_multiplier(tangent):
     """Largest multiplier of the last lap that returned; 0 if it is not known."""
-    return 0.0
-
-
-@largest_multiplier.implements(Tangent)
-def _largest_multiplier(tangent):
     return 0.0 if isnan(tangent.multipliers.first) else tangent.multipliers.first
 
 
-@hook(optional=True)
+@feature("(nan, nan)")
 def exponent(tangent):
     """Largest exponent up to now and its standard error, 1/s; NaN if it is not known."""
-    return nan, nan
-
-
-@exponent.implements(Tangent)
-def _exponent(tangent):
     b = tangent.blocks
     if b.number <= 1.0:
         return nan, nan
     return (b.growth - b.first_growth) / (b.t - b.first_t), sqrt(b.squares / (b.number * (b.number - 1.0)))
 
 
-@hook(optional=True)
+@feature("outcome")
 def with_exponent(tangent, outcome, period, scene):
-    """Outcome of a run of this period, s, with exponent, its error and multipliers if they are asked for."""
-    return outcome
-
-
-@with_exponent.implements(Tangent)
-def _with_exponent(tangent, outcome, period, scene):
+    """Outcome of a run of this period, s, with exponent, its error and multipliers."""
     m = tangent.multipliers
     rate, error = exponent(tangent)
     if isnan(period) or isnan(m.first):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ringsweep.compile import hook
+from ringsweep.compile import feature
 from ringsweep.models.interface import implicit, series, variation
 from ringsweep.numerics.clock import later
 from ringsweep.numerics.collocation import FEW, MANY, WEIGHTS_OF_FEW, WEIGHTS_OF_MANY, largest_trace, store
@@ -13,36 +13,21 @@ from ringsweep.solvers import rosenbrock
 _MOST_GROWTH = 1.0
 
 
-@hook(optional=True)
+@feature("record")
 def enter_series(asked, scene, record, mode, c):
     """Record at the beginning of a step of series."""
-    return record
-
-
-@enter_series.implements(variation.Exponent)
-def _enter_series(asked, scene, record, mode, c):
     return variation.enter(scene, record, mode, series.rates_at(scene, c, 0.0))
 
 
-@hook(optional=True)
+@feature("record")
 def enter_implicit(asked, scene, record, start):
     """Record at the beginning of an implicit step."""
-    return record
-
-
-@enter_implicit.implements(variation.Exponent)
-def _enter_implicit(asked, scene, record, start):
     return variation.enter(scene, record, start.mode, start.linear[0])
 
 
-@hook(optional=True)
+@feature("record")
 def along_series(asked, scene, record, run, ends, scratch):
     """Record after an interval of a step of series, which begins with `run`; `ends` are those of the interval, s."""
-    return record
-
-
-@along_series.implements(variation.Exponent)
-def _along_series(asked, scene, record, run, ends, scratch):
     c, work, (low, high) = scratch.c, scratch.work[1:], ends
     width = high - low
     while low < high:
@@ -59,14 +44,9 @@ def _along_series(asked, scene, record, run, ends, scratch):
     return record
 
 
-@hook(optional=True)
+@feature("record")
 def along_implicit(asked, scene, record, start, taken, ends, scratch):
     """Record after an interval of an implicit step, `taken`; `ends` are those of the interval, as fractions."""
-    return record
-
-
-@along_implicit.implements(variation.Exponent)
-def _along_implicit(asked, scene, record, start, taken, ends, scratch):
     (low, high), work = ends, scratch.work[1:]
     if not high > low:
         return record
@@ -82,12 +62,7 @@ def _along_implicit(asked, scene, record, start, taken, ends, scratch):
     return variation.advance(scene, record, (high - low) * taken.h, rates, WEIGHTS_OF_FEW, work)
 
 
-@hook(optional=True)
+@feature("record")
 def at_event(asked, scene, record, mode, guard, t, y):
     """Record after a guard of a mode has vanished."""
-    return record
-
-
-@at_event.implements(variation.Exponent)
-def _at_event(asked, scene, record, mode, guard, t, y):
     return variation.switched(scene, record, mode, guard, t, y)

@@ -166,11 +166,13 @@ class Belt(Model, Continues):
             "initial_v": sliding,
             "span": values["time.span"],
         }
-        if structure.exponent:
-            fields["asked"] = Exponent()
         if structure.section is not None:
             fields["section"] = section.field(structure.section, SECTION, len(mass))
         fields |= _periods(structure, values, np.broadcast_to(drives.period(forced), mass.shape))
+        if structure.exponent:
+            rate = 2.0 * np.pi / np.minimum(fields["forcing_period"], values["time.span"])
+            natural = np.sqrt(abs(values["spring.stiffness"]) / mass)
+            fields["asked"] = Exponent.of(np.maximum(natural, rate), int(friction.family_of(law) is friction.Dynamic))
         # Without a spring the motion has no speed of its own.
         stiffness = values["spring.stiffness"]
         speed = mu_s * gravity * np.sqrt(np.divide(mass, stiffness, out=np.zeros_like(mass), where=stiffness > 0.0))

@@ -138,8 +138,8 @@ class Record(NamedTuple):
         As in :class:`Outcome`, but the displacement only at turns.
     stops : Stops
     cycles : Cycles
-    shocks : Shocks or Unlocated
-        Jumps of the acceleration.
+    shocks : Shocks
+        Jumps of the acceleration; an empty tuple if the method does not locate events.
     tangent : Tangent
         Growth of small disturbances; an empty tuple if no exponent is asked for.
     section : Points
@@ -206,8 +206,8 @@ def begin(scene, t, seen, band, play):
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
         cycles.begin(_first_time(scene), start),
-        shock.begin(acceleration),
-        tangent.begin(scene.asked, scene, t),
+        shock.at_launch(acceleration),
+        tangent.undisturbed(scene.asked, scene, t),
         (),
     )
 
@@ -263,9 +263,9 @@ def _observe(scene, record, t, duration, stuck, seen):
         max(r.force_max, abs(force)),
         stops,
         cycles_now,
-        shock.observe(r.shocks, acceleration),
-        tangent.observe(r.tangent, scene, r.cycles, cycles_now, t, duration),
-        section.observe(scene.section, scene, r, cycles_now, now, (deflection,)),
+        shock.without_event(r.shocks, acceleration),
+        tangent.observed(r.tangent, scene, r.cycles, cycles_now, t, duration),
+        section.with_point(scene.section, scene, r, cycles_now, now, (deflection,), _least_turn(r, r.x_max - r.x_min)),
     )
 
 
@@ -295,6 +295,12 @@ def _leaves_play(scene, r, place):
 def _least_slip(r):
     """Distance that a slip is longer than, m; negative without bristles, which creep a little before they hold."""
     return select(r.play < 0.0, r.play, max(r.play, RETURN * (r.x_max - r.x_min)))
+
+
+@absorbed
+def _least_turn(r, span):
+    """Distance between turns that count, m; `span` is the range of the displacement."""
+    return max(r.play, _ROUNDING * span)
 
 
 def _located(before, now):
@@ -383,7 +389,7 @@ def _cycles(scene, r, stops, now, v, turn, span):
     # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
     # in stick disturbs this turn.
     backward = v > now.velocity
-    far = high - low > max(r.play, _ROUNDING * span)
+    far = high - low > _least_turn(r, span)
     turns = far & select(backward, turn.is_greatest, turn.is_least) & (period == inf)
     old = _with_extremes(c, low, high)
     count = select(due, cycles.number_at(c, period, now.t), c.count + select(turns, 1.0, 0.0))
@@ -413,7 +419,7 @@ def _conclude(scene, record, status, t, place, velocity):
     if holds_in_band(scene.law) and r.band > 0.0:
         # The state holds the momentum, which moves nothing in a dead band.
         velocity = r.last.velocity
-    section.finish(scene.section, scene, r)
+    section.put_in_order(scene.section, r.section)
     motion, long_run, period, share, stops, drift = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED

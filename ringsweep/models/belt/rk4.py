@@ -8,7 +8,6 @@ from ringsweep.models.belt.creep import deflection
 from ringsweep.models.belt.force import moving, sliding
 from ringsweep.models.inspection import inspection, rates, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
-from ringsweep.models.interface.shock import Unlocated
 from ringsweep.physics import drives
 from ringsweep.physics.belt import Belt, BristleBelt
 
@@ -36,7 +35,7 @@ def _inspect(scene, y, forcing):
 @constant_step.seen.implements(Belt, BristleBelt)
 def _seen(scene, y, now):
     # The record takes the rate of the sliding velocity from the differences of short steps.
-    return y[0], now.motion[2], now.friction, now.place, moving(scene, now.v, now.v, 0.0), 0.0, Unlocated(), nan
+    return y[0], now.motion[2], now.friction, now.place, moving(scene, now.v, now.v, 0.0), 0.0, (), nan
 
 
 @constant_step.row.implements(Belt, BristleBelt)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
-
-from ringsweep.compile import hook
+from ringsweep.compile import feature, hook
 from ringsweep.models import section, tangent
 from ringsweep.models.belt.bristles import recoil_speed
 from ringsweep.models.belt.force import stuck_gradient, stuck_rates
@@ -28,15 +26,10 @@ def _asked(scene):
 
 @variation.due.implements(Belt, BristleBelt)
 def _due(scene, record):
-    return min(_due_if_asked(scene.asked, record), section.due(scene.section, record))
+    return min(_end_of_cycle(scene.asked, record), section.due(scene.section, record))
 
 
-@hook(optional=True)
-def _due_if_asked(asked, record):
-    return inf
-
-
-@_due_if_asked.implements(variation.Exponent)
+@feature("inf")
 def _end_of_cycle(asked, record):
     return record.cycles.next
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import nan
 from typing import NamedTuple
 
-from ringsweep.compile import hook, inlined, replacing
+from ringsweep.compile import feature, hook, inlined, replacing
 from ringsweep.physics.friction import Smooth
 
 # A change of the acceleration below this share of its size, or of a jump, is an error of the method.
@@ -21,10 +21,6 @@ class Located(NamedTuple):
 
     acceleration: float
     size: float
-
-
-class Unlocated(NamedTuple):
-    """In place of the acceleration, and of the shocks, for a method that does not locate events."""
 
 
 class Shocks(NamedTuple):
@@ -50,26 +46,16 @@ class Shocks(NamedTuple):
 _with_acceleration = replacing("acceleration")
 
 
-@hook(optional=True)
-def begin(seen):
-    """Shocks at the beginning of a run, from what a method shows: :class:`Located` or :class:`Unlocated`."""
-    return seen
-
-
-@begin.implements(Located)
-def _begin(seen):
+@feature("()")
+def at_launch(seen):
+    """Shocks at the beginning of a run, from what a method shows: an empty tuple unless it locates events."""
     return Shocks(seen.acceleration, 0.0, 0.0, nan)
 
 
-@hook(absorb=True, optional=True)
-def observe(shocks, seen):
+@feature("shocks", absorb=True)
+def without_event(shocks, seen):
     """Shocks after one more observation."""
-    return shocks
-
-
-@observe.implements(Shocks)
-def _observe(shocks, seen):
-    return Shocks(seen.acceleration, shocks.jump_max, shocks.first, shocks.t_jump_max)
+    return _with_acceleration(shocks, seen.acceleration)
 
 
 @inlined
@@ -80,7 +66,7 @@ def enter(shocks, t, seen):
         if jump > (1.0 + _LEAST_SHARE) * shocks.first:
             return Shocks(seen.acceleration, jump, jump, t)
         return Shocks(seen.acceleration, jump, shocks.first, shocks.t_jump_max)
-    return observe(shocks, seen)
+    return without_event(shocks, seen)
 
 
 @hook(optional=True)
@@ -94,12 +80,7 @@ def _without_jump(law_family, shocks):
     return _with_acceleration(shocks, nan)
 
 
-@hook(optional=True)
+@feature("(nan, nan)")
 def largest(shocks):
     """Largest jump and its time, s; NaN where it is not known."""
-    return nan, nan
-
-
-@largest.implements(Shocks)
-def _largest(shocks):
     return shocks.jump_max, shocks.t_jump_max

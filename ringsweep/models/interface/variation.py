@@ -12,13 +12,32 @@ where n is the gradient of the guard h. In stick w keeps no component along the 
 from __future__ import annotations
 
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ringsweep.compile import hook
+from ringsweep.quantities.parameters import Leaf
 
 
 class Exponent(NamedTuple):
-    """What a scene asks for: the exponent of its motion."""
+    """What a scene asks for: the exponent of its motion.
+
+    Attributes
+    ----------
+    frequency : float
+        Velocity, m/s, that counts as much in a disturbance as a unit of the place, m or rad.
+    disturbance : tuple of float
+        A disturbance of the state whose components count alike.
+    """
+
+    frequency: Leaf
+    disturbance: tuple[Leaf, ...]
+
+    @classmethod
+    def of(cls, frequency: Any, bristles: int = 0) -> Exponent:
+        """Field ``asked`` of the cells of a batch, whose state holds place, velocity and so many deflections."""
+        return cls(frequency, (1.0 / frequency, np.ones(len(frequency)), *[1.0 / frequency] * bristles))
 
 
 @hook(optional=True)

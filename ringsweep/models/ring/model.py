@@ -210,24 +210,25 @@ class SingleContactRing(Model, Continues):
             initial_omega=values["initial.omega"],
             span=values["time.span"],
             epsilon_omega=values["classify.epsilon_omega"],
-            **(self._recorded(structure, values) if _is_recorded(structure) else {}),
+            **(self._recorded(structure, values, body) if _is_recorded(structure) else {}),
         )
 
-    def _recorded(self, structure: Structure, values: Values) -> dict[str, Any]:
+    def _recorded(self, structure: Structure, values: Values, body: Any) -> dict[str, Any]:
         """Fields of a cell for what is asked for beyond the outcomes."""
-        found: dict[str, Any] = {
-            "forcing_period": self.forcing_period(structure, values),
-            "long_run": long_run.Asked(),
-        }
+        period, span = self.forcing_period(structure, values), values["time.span"]
+        with np.errstate(divide="ignore"):
+            pace = np.minimum(2.0 * pi * np.sqrt(body.radius / body.gravity), period)
+        found: dict[str, Any] = {"forcing_period": period, "long_run": long_run.Asked(pace)}
         if structure.exponent:
             if self._has_bristles(structure):
                 problem = (
                     f"friction law {structure.law} has none on a ring: choose a law without bristles, or leave it out"
                 )
                 raise InputError("record.exponent", problem)
-            found["asked"] = Exponent()
+            rate = np.maximum(np.sqrt(body.gravity / body.radius), 2.0 * pi / np.minimum(period, span))
+            found["asked"] = Exponent.of(body.radius * rate)
         if structure.section is not None:
-            found["section"] = section.field(structure.section, self._point, len(values["time.span"]))
+            found["section"] = section.field(structure.section, self._point, len(span))
         return found
 
     def build_body(self, values: Values) -> Any:

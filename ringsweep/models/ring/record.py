@@ -35,8 +35,8 @@ class Record(NamedTuple):
         Bounds of the angle before the last reversal.
     omega_min, omega_max, stick_time, normal_min_1, normal_min_2, normal_max_1, normal_max_2 : float
         As in :class:`Outcome`.
-    shocks : Shocks or Unlocated
-        Jumps of the angular acceleration.
+    shocks : Shocks
+        Jumps of the angular acceleration; an empty tuple if the method does not locate events.
     long_run : LongRun
         What the motion settles to; an empty tuple if this is not asked for.
     """
@@ -88,7 +88,7 @@ def begin(seen, epsilon_omega):
     """Record at the beginning of a run."""
     phi, omega, normal_1, normal_2, acceleration = seen[0], seen[1], seen[2], seen[3], seen[4]
     sense = 1.0 if omega > epsilon_omega else -1.0 if omega < -epsilon_omega else 0.0
-    reactions, shocks = (normal_1, normal_2), shock.begin(acceleration)
+    reactions, shocks = (normal_1, normal_2), shock.at_launch(acceleration)
     return Record(sense, 0.0, phi, phi, phi, phi, omega, omega, 0.0, *reactions, *reactions, shocks, ())
 
 
@@ -201,19 +201,19 @@ with_long_run, _with_shocks = replacing("long_run"), replacing("shocks")
 @recorder.begin.implements(Ring, BristleRing)
 def _begin(scene, t, seen):
     begun = begin(seen, scene.epsilon_omega)
-    return with_long_run(begun, long_run.begin(scene.long_run, scene, t, seen))
+    return with_long_run(begun, long_run.launched(scene.long_run, scene, t, seen))
 
 
 @recorder.lend.implements(Ring, BristleRing)
 def _lend(scene, record, row):
-    return with_long_run(record, long_run.lent(record.long_run, scene, row))
+    return with_long_run(record, long_run.with_room(record.long_run, scene, row))
 
 
 @recorder.observe.implements(Ring, BristleRing)
 def _observe(scene, record, t, duration, stuck, seen):
-    shocks = shock.observe(record.shocks, seen[4])
+    shocks = shock.without_event(record.shocks, seen[4])
     r = observe(record, shocks, select(stuck, duration, 0.0), seen, scene.epsilon_omega)
-    return with_long_run(r, long_run.observe(r.long_run, scene, r.stick_time, t, duration, seen))
+    return with_long_run(r, long_run.continued(r.long_run, scene, r.stick_time, t, duration, seen))
 
 
 @recorder.enter.implements(Ring, BristleRing)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ringsweep.models.inspection import inspection, rates, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
-from ringsweep.models.interface.shock import Unlocated
 from ringsweep.models.ring.contacts import zones_at
 from ringsweep.models.ring.creep import deflections
 from ringsweep.models.slip import Slip
@@ -50,7 +49,7 @@ def _arc_share(scene, now, h):
 
 @constant_step.seen.implements(Ring, BristleRing)
 def _seen(scene, y, now):
-    return y[0], y[1], now.normal_1, now.normal_2, Unlocated()
+    return y[0], y[1], now.normal_1, now.normal_2, ()
 
 
 @constant_step.row.implements(Ring, BristleRing)
