@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -128,6 +129,12 @@ class Accessor:
         from ringsweep.plots.maps import regime_map
 
         return regime_map(self._ds, var=var, **options)
+
+    def report(self, path: str | os.PathLike[str]) -> None:
+        """Write one page with pictures, thresholds and certificates; see :func:`ringsweep.report.report`."""
+        from ringsweep.report import report
+
+        report(self._ds, path)
 
     def boundary(self, regime: str, tolerance: float = 1e-6) -> xr.Dataset:
         """Curves around the cells of a regime; see :func:`ringsweep.boundary`."""

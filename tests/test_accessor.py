@@ -1,7 +1,10 @@
 """The functions of ringsweep as ``ds.ringsweep``: the same results as the functions."""
 
+import html
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from ringsweep import plots
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.runs.plans import plan_of
+from ringsweep.runs.thresholds import in_words
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +60,32 @@ def test_frames_of_a_history_have_a_row_for_each_sample_or_event(ds):
     assert events.event_kind.tolist() == ringsweep.words(run.event_kind).values.tolist()
     with pytest.raises(ringsweep.InputError, match="no dimension"):
         run.ringsweep.to_frame("point")
+
+
+def test_report_has_pictures_thresholds_and_citation_and_needs_no_network(ds, scene, tmp_path):
+    ds.ringsweep.report(tmp_path / "my.html")
+    page = (tmp_path / "my.html").read_text(encoding="utf-8")
+    assert page.count('src="data:image/png;base64,') == 3
+    assert set(re.findall(r'(?:src|href)="(\w+)', page)) == {"data"}
+    found = ringsweep.threshold(scene, "zone.half_angle", "separating", ("5 deg", "15 deg"))
+    assert in_words(found).splitlines()[0] in html.unescape(page)
+    for text in (
+        "certified: 100.0%",
+        "doi.org/10.3390/computation12090181",
+        "greatest: jump_max",
+        "half_angle: 15 deg",
+    ):
+        assert text in page
+
+
+def test_report_that_cannot_be_written_leaves_the_older_one(ds, tmp_path, monkeypatch):
+    (tmp_path / "my.html").write_text("older")
+    monkeypatch.setattr(Path, "write_text", lambda *_, **__: (_ for _ in ()).throw(OSError("full")))
+    with pytest.raises(OSError, match="full"):
+        ds.isel(drive_amplitude=[1], zone_half_angle=[1]).ringsweep.report(tmp_path / "my.html")
+    assert (tmp_path / "my.html").read_bytes() == b"older"
+    with pytest.raises(ringsweep.InputError, match=r"reports end in \.html"):
+        ds.ringsweep.report(tmp_path / "my.txt")
 
 
 class TestAHistoryAtOtherTimes:

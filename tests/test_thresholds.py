@@ -101,7 +101,9 @@ class TestThreshold:
         config = tmp_path / "belt.yaml"
         config.write_text(json.dumps({"scene": BELT, "sweep": {"grid": {"friction.mu_s": [0.3, 0.4]}}}))
         assert cli.main(["threshold", str(config), "--path", "friction.mu_s", "--regime", "riding", "--scan", "5"]) == 0
-        assert "riding neither begins nor ends there\nscan: 5 runs from 0.3 to 0.4: 5 riding" in capsys.readouterr().out
+        out, err = capsys.readouterr()
+        assert "riding neither begins nor ends along friction.mu_s\nscan: 5 runs from 0.3 to 0.4: 5 riding" in out
+        assert not err
 
 
 class TestDistribution:

@@ -162,6 +162,22 @@ def plot_command(arguments: argparse.Namespace) -> None:
     drawing.draw_stored(arguments, drawing.draw_plot)
 
 
+def report_command(arguments: argparse.Namespace) -> None:
+    """Write one page about a sweep, to send to a colleague.
+
+    ringsweep report my.nc             my-report.html: map, thresholds, shocks, certificates, what to cite
+    """
+    from ringsweep.cli import drawing
+    from ringsweep.report import report
+
+    def write(_: argparse.Namespace, dataset: Path, result: Any) -> None:
+        target = arguments.output or dataset.with_name(f"{dataset.stem}-report.html")
+        report(result, target)
+        print(f"wrote {target}")
+
+    drawing.draw_stored(arguments, write)
+
+
 def simulate_command(arguments: argparse.Namespace) -> int:
     """Run once, or under each law of a sweep: history and its picture.
 

@@ -57,6 +57,9 @@ def build_parser() -> argparse.ArgumentParser:
     _option(draw, "--boundaries REGIME", "locate the boundary of a regime: curves, also as NetCDF")
     _option(draw, "--tolerance T", "error of these, in SI units (default: 1e-6)", type=_POSITIVE)
 
+    report = _add_command(entries, commands.report_command, "dataset OUT.nc")
+    _option(report, "-o --output MY.html", "default: beside OUT.nc")
+
     threshold = _add_command(entries, commands.threshold_command, "config CONFIG.yaml", "or OUT.nc, whose scene is run")
     _option(threshold, "--path PATH", "the number that varies: drive.amplitude", required=True)
     _option(threshold, "--regime REGIME", "the regime: separating; with impact also: tumbled", required=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 import xarray as xr
 
@@ -18,56 +20,65 @@ def status_of(result: xr.Dataset) -> int:
 
 
 def summarise(result: xr.Dataset) -> None:
-    """Print the number of cells, the share of each regime, the share of certified cells and the bounds on errors.
+    """Print the summary of a result."""
+    print(*chain(*summary(result).values()), sep="\n")
 
-    Of the curves of a boundary, print their number and the largest distance of the boundary from them.
+
+def summary(result: xr.Dataset) -> dict[str, list[str]]:
+    """What a result says, in lines, by what they are about.
+
+    ``"regimes"`` has the number of cells and the share of each regime, or its probability; ``"aftermath"`` what follows
+    a lost contact; ``"shocks"`` what loads the body most; ``"certificates"`` the share of certified cells, the reasons
+    why others are not, and the bounds on errors. Of the curves of a boundary, ``"boundary"`` has their number and the
+    largest distance of the boundary from them.
     """
     if "vertex" in result.dims:
         curves, points = len(np.unique(result["line"])), result.sizes["vertex"]
-        print(f"boundary of {result.attrs['boundary_of']}: {curves} curves, {points} points", end="")
-        print(f", each within {result['error'].values.max():.2g} along its axis" if points else "")
-        return
+        within = f", each within {result['error'].values.max():.2g} along its axis" if points else ""
+        return {"boundary": [f"boundary of {result.attrs['boundary_of']}: {curves} curves, {points} points{within}"]}
     if "probability" in result:
-        _summarise_sample(result)
-        return
+        return _of_sample(result)
     regime = result["regime"]
-    print("cells:", regime.size)
-    _print_shares(result, "regime")
+    found = {"regimes": [f"cells: {regime.size}", *_shares(result, "regime")]}
     if "aftermath" in result:
-        print("contacts:")
-        _print_shares(result, "aftermath")
-        _print_losses(result)
+        found["aftermath"] = ["contacts:", *_shares(result, "aftermath"), *_losses(result)]
     if extremes := [extreme for name in _GREATEST if name in result and (extreme := _extreme(result, name))]:
-        print("greatest:", ", ".join(extremes))
+        found["shocks"] = [f"greatest: {', '.join(extremes)}"]
+    lines = found["certificates"] = []
     if "certified" in result:
         # NaN in a refined sweep, where no cell was run.
         run = sum(np.count_nonzero(~np.isnan(part)) for (part,) in parts(result, "certified"))
         share = sum(np.count_nonzero(part == 1) for (part,) in parts(result, "certified")) / run
-        # Rounding must not turn "nearly all" into 100 %.
-        of = "" if run == regime.size else f" of the {run} cells run"
-        print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}{of}")
+        lines.append(f"certified: {_share_at_most(share)}{'' if run == regime.size else f' of the {run} cells run'}")
     if "uncertified_because" in result:
-        for flag, name, count in _counts(result, "uncertified_because"):
-            if flag != CERTIFIED:
-                print(f"  {count} not: {DOUBTS.get(name, name)}")
+        counts = _counts(result, "uncertified_because")
+        lines += [f"  {count} not: {DOUBTS.get(name, name)}" for flag, name, count in counts if flag != CERTIFIED]
     if "settled" in result:
         unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED, SEPARATING, JAMMED])
         if unsettled.any():
             cells = np.count_nonzero(result["origin"] != INFERRED) if "origin" in result else regime.size
-            print(f"not settled: {int(unsettled.sum()) / cells:.1%} of the motions; a longer span may change them")
+            lines.append(
+                f"not settled: {int(unsettled.sum()) / cells:.1%} of the motions; a longer span may change them"
+            )
     if "audit" in result.attrs:
-        print("refined:", result.attrs["audit"])
-    lines = []
+        lines.append(f"refined: {result.attrs['audit']}")
+    bounds = []
     for name in (str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")):
-        bounds = np.concatenate([part[np.isfinite(part)] for (part,) in parts(result, f"{name}_error")])
-        if bounds.size:
-            lines.append(f"  {name}: {np.median(bounds):.1e}, {bounds.max():.1e} {result[name].attrs.get('units', '')}")
-    if lines:
-        print("bounds on errors (median, largest):", *lines, sep="\n")
+        known = np.concatenate([part[np.isfinite(part)] for (part,) in parts(result, f"{name}_error")])
+        if known.size:
+            unit = result[name].attrs.get("units", "")
+            bounds.append(f"  {name}: {np.median(known):.1e}, {known.max():.1e} {unit}".rstrip())
+    lines += ["bounds on errors (median, largest):", *bounds] if bounds else []
     for name in {"phi_end_error", "x_end_error"} & set(result):
         both = parts(result, "certified", name)
         if unbounded := sum(np.count_nonzero((certified == 1) & np.isnan(bound)) for certified, bound in both):
-            print(f"no bound where nearby runs diverge: {unbounded} of the certified cells")
+            lines.append(f"no bound where nearby runs diverge: {unbounded} of the certified cells")
+    return found
+
+
+def _share_at_most(share: float) -> str:
+    """A share in per cent; rounding does not turn "nearly all" into 100 %."""
+    return f"{share if share == 1.0 else min(share, 0.999):.1%}"
 
 
 # What loads or shakes the body most, over all cells.
@@ -89,14 +100,14 @@ def _counts(result: xr.Dataset, variable: str) -> list[tuple[int, str, int]]:
     return [(flag, name, int(n)) for (flag, name), n in zip(meanings.items(), counts, strict=True) if n]
 
 
-def _print_shares(result: xr.Dataset, variable: str) -> None:
-    """Print the number and the share of the cells of each class that occurs."""
-    for _, meaning, count in _counts(result, variable):
-        print(f"  {meaning}: {count} ({count / result[variable].size:.1%})")
+def _shares(result: xr.Dataset, variable: str) -> list[str]:
+    """The number and the share of the cells of each class that occurs."""
+    size = result[variable].size
+    return [f"  {meaning}: {count} ({count / size:.1%})" for _, meaning, count in _counts(result, variable)]
 
 
-def _print_losses(result: xr.Dataset) -> None:
-    """Print how often the contacts of a run are lost, and how often they hit the ring."""
+def _losses(result: xr.Dataset) -> list[str]:
+    """How often the contacts of a run are lost, and how often they hit the ring."""
     told = []
     for name, what in (("separations", "losses of contact"), ("impacts", "impacts")):
         if name not in result:
@@ -106,8 +117,8 @@ def _print_losses(result: xr.Dataset) -> None:
         if counts.size:
             ends = f"{counts.min():.0f} to {counts.max():.0f}, median {np.median(counts):.0f}"
             told.append(f"{what} {counts[0]:.0f}" if result["regime"].size == 1 else f"{what} {ends}")
-    if told:
-        print("  in a run that has any:" if result["regime"].size > 1 else "  in this run:", "; ".join(told))
+    several = "in a run that has any" if result["regime"].size > 1 else "in this run"
+    return [f"  {several}: {'; '.join(told)}"] if told else []
 
 
 # Events of a run that are printed: all, or the first and the last. Where contacts hit, only events of contacts are.
@@ -146,27 +157,28 @@ def events_in_words(run: xr.Dataset) -> str:
 _MOST_PARAMETERS = 3
 
 
-def _print_indices(of: xr.Dataset) -> None:
-    """Print the greatest total indices of a regime in one cell, unless nothing is known of them."""
+def _indices(of: xr.Dataset) -> list[str]:
+    """The total indices of a regime in one cell, the greatest first, unless nothing is known of them."""
     if "sobol_total" not in of or float((of["sobol_total_high"] - of["sobol_total_low"]).min()) >= 1.0:
-        return
-    order = np.argsort(-of["sobol_total"].values)[:_MOST_PARAMETERS]
-    told = (of.isel(parameter=k) for k in order.tolist())
-    parts = (
+        return []
+    order = np.argsort(-of["sobol_total"].values)
+    told = (of.isel(parameter=k) for k in order[:_MOST_PARAMETERS].tolist())
+    parts = [
         f"{one['parameter'].item()} {float(one['sobol_total']):.0%}"
         f" ({float(one['sobol_total_low']):.0%} to {float(one['sobol_total_high']):.0%})"
         for one in told
-    )
-    print(f"    total Sobol index: {', '.join(parts)}")
+    ]
+    if len(order) > len(parts):
+        parts.append(f"and {len(order) - len(parts)} smaller")
+    return [f"    total Sobol index: {', '.join(parts)}"]
 
 
-def _summarise_sample(result: xr.Dataset) -> None:
-    """Print the probability of each regime that occurs, with its interval; of several cells the range."""
+def _of_sample(result: xr.Dataset) -> dict[str, list[str]]:
+    """The probability of each regime that occurs, with its interval; of several cells the range."""
     probability = result["probability"]
     cells = probability.size // result.sizes["word"]
-    print("cells:", cells)
-    print("sample:", result.attrs.get("sample"))
-    print("interval:", result.attrs.get("sample_interval"))
+    lines = [f"cells: {cells}", f"sample: {result.attrs.get('sample')}"]
+    lines.append(f"interval: {result.attrs.get('sample_interval')}")
     grid = [dim for dim in probability.dims if dim != "word"]
     for word in map(str, result["word"].values):
         of = {name: result[name].sel(word=word) for name in result.data_vars if str(name).startswith("probability")}
@@ -175,15 +187,16 @@ def _summarise_sample(result: xr.Dataset) -> None:
         if cells == 1:
             share, low, high, numerics = (float(column.values.squeeze()) for column in of.values())
             part = f", of which {numerics:.2%} are numerics" if numerics > 0.0 else ""
-            print(f"  {word}: {share:.2%} ({low:.2%} to {high:.2%}{part})")
-            _print_indices(result.sel(word=word).squeeze(grid))
+            lines += [f"  {word}: {share:.2%} ({low:.2%} to {high:.2%}{part})"]
+            lines += _indices(result.sel(word=word).squeeze(grid))
             continue
         shares = of["probability"].values
-        print(f"  {word}: {shares.min():.2%} to {shares.max():.2%}, mean {shares.mean():.2%}", end="")
-        length = (of["probability_high"] - of["probability_low"]).max()
-        print(f"; intervals up to {float(length):.2%} long", end="")
+        length = float((of["probability_high"] - of["probability_low"]).max())
         numerics = float(of["probability_numerics"].max(grid))
-        print(f", of which up to {numerics:.2%} are numerics" * (numerics > 0.0))
+        lines.append(
+            f"  {word}: {shares.min():.2%} to {shares.max():.2%}, mean {shares.mean():.2%}; intervals up to "
+            f"{length:.2%} long{f', of which up to {numerics:.2%} are numerics' if numerics > 0.0 else ''}"
+        )
     runs = result["runs"]
     share = float(runs.isel(certificate=1).sum() / runs.sum())
-    print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%} of {int(runs.sum())} runs")
+    return {"regimes": lines, "certificates": [f"certified: {_share_at_most(share)} of {int(runs.sum())} runs"]}

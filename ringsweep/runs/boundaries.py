@@ -75,7 +75,10 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     """
     tolerance = quantity(tolerance, _TOLERANCE, "tolerance")
     configuration = _checked_configuration(ds, regime, jobs)
-    return located(ds, regime, configuration, tolerance, jobs=jobs)
+    found = located(ds, regime, configuration, tolerance, jobs=jobs)
+    if not found.sizes["vertex"]:
+        logger.warning("no boundary of %s: no two neighbouring certified cells differ in it", regime)
+    return found
 
 
 def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float, *, jobs: int | None) -> xr.Dataset:
@@ -87,8 +90,6 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
     low = np.concatenate([one for one, _ in sides])
     high = np.concatenate([other for _, other in sides])
     axis = np.repeat(np.arange(len(dims)), [len(one) for one, _ in sides])
-    if not len(low):
-        logger.warning("no boundary of %s: no two neighbouring certified cells differ in it", regime)
     columns = {str(c.name): c for c in swept(ds)}
     place = {name: _values(c, dims, low) for name, c in columns.items()}
     ends = np.zeros((2, len(low)))

@@ -337,7 +337,7 @@ def in_words(found: xr.Dataset) -> str:
         does, side = ("begins", "below") if begins else ("ends", "above")
         lines.append(f"{regime} {does} at {path} = {_with_error(value, error)}{_unit(axis)}; {side}: {beyond}")
     if not lines:
-        lines.append(f"{regime} neither begins nor ends there")
+        lines.append(f"{regime} neither begins nor ends along {path}")
     return "\n".join([*lines, f"scan: {found.attrs['scan']}; {_MISSED}"])
 
 
