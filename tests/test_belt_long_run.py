@@ -1,5 +1,6 @@
 """What a motion on the belt settles to is decided by evidence that does not hang on the end of the span."""
 
+import re
 from math import pi
 from types import SimpleNamespace
 
@@ -98,6 +99,14 @@ def test_the_exponent_tells_chaos_from_motion_on_a_torus():
         assert np.isnan(found.period).all()
     assert (chaotic.lyapunov > 3.0 * chaotic.lyapunov_error).all()
     assert (abs(torus.lyapunov) < 3.0 * torus.lyapunov_error).all()
+
+
+def test_span_that_the_warning_names_is_enough_to_show_a_torus(caplog):
+    of, period = cubic(0.6, 0.8), 2.0 * pi / 0.6
+    assert words(over(of, 0.6, [100], True)) == ["transient"]
+    needed = float(re.search(r"that of a torus, takes about (\S+) s", caplog.text).group(1))
+    assert 100 * period < needed < 1000 * period
+    assert words(over(of, 0.6, [needed / period], True)) == ["quasi-periodic"]
 
 
 def test_word_does_not_change_where_the_span_passes_a_power_of_two_periods():

@@ -174,9 +174,9 @@ _SAME_STOPS = 1e-9
 # Share of a time by which rounding may change it.
 _SAME = 1e-13
 
-# An exponent is positive if it exceeds so many standard errors. It is zero if with so many it changes a disturbance by
-# less than the second share in a cycle.
-_POSITIVE, _ZERO = 3.0, 0.02
+#: An exponent is positive if it exceeds so many standard errors. It is zero if with so many it changes a disturbance by
+#: less than the second share in a cycle.
+POSITIVE, ZERO = 3.0, 0.02
 
 # A multiplier above this one is that of an unstable motion, which does not last.
 _UNSTABLE = 1.01
@@ -345,7 +345,7 @@ def returns_each_time(scene, c, forced, fast, largest_multiplier, growth):
     if laps.number < (_LAPS if forced else _LAPS_IF_FREE) and laps.gap > _EXACT:
         return False
     soon = _SPANS * scene.span
-    if forced and exponent > _POSITIVE * error and exponent * soon > 1.0:
+    if forced and exponent > POSITIVE * error and exponent * soon > 1.0:
         # It returns within the tolerance only, or stays beside a periodic motion for a while.
         return False
     # The corners are states at the ends of laps, and so is the reference.
@@ -414,10 +414,10 @@ def without_return(c, forced_by_period, cycle, growth):
         return TRANSIENT
     least, most = min(scatter_1, scatter_2), max(scatter_1, scatter_2)
     grown, rounding = exponent * (time_1 + time_2), (_SCATTERED * mean_1) ** 2
-    if exponent > _POSITIVE * error:
+    if exponent > POSITIVE * error:
         chaos = grown > _GROWN and rounding < least and most <= _SAME_SCATTER * least
         return CHAOTIC if chaos else TRANSIENT
-    neutral = (abs(exponent) + _POSITIVE * error) * cycle <= _ZERO
+    neutral = (abs(exponent) + POSITIVE * error) * cycle <= ZERO
     if forced_by_period:
         return QUASI_PERIODIC if neutral and c.lap == 0.0 and most <= _SAME_ON_TORUS * least else TRANSIENT
     # Under forcing that does not repeat, neither does a motion that has forgotten its start.

@@ -9,6 +9,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config
+from ringsweep.config.axes import by_law, values_at
+from ringsweep.models import model_of
+from ringsweep.models.cycles import POSITIVE, ZERO
+from ringsweep.models.model import Continues
 from ringsweep.quantities.flags import FAILED, JAMMED, REGIMES, RIDING, SEPARATING
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import rounded_up
@@ -77,7 +81,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     if unsettled:
         who = "the motion has" if size == 1 else f"{unsettled / count:.1%} of the motions have"
         what = "regime, share of stick and stops" if "stick_share" in results else "what it settles to"
-        logger.warning("%s not settled: a longer span may change %s", who, what)
+        logger.warning("%s not settled: a longer span may change %s%s", who, what, _hint_at_a_torus(results, config))
     if riding := cells[RIDING]:
         who = "the body rides: it has" if size == 1 else f"{riding / size:.1%} of the bodies ride: they have"
         why = "the pull does not reach mu_s F_N within the span (a spring on a steady belt pulls with k v t)"
@@ -89,6 +93,31 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     if ended_at_start > 0.5 * count:
         runs = "the run ends" if count == 1 else f"{ended_at_start / count:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
+
+
+def _hint_at_a_torus(results: xr.Dataset, config: Config) -> str:
+    """In which span exponents that may be 0 would be known well enough: their errors fall as the span grows."""
+    scene, axes, needed, start = config.scene, config.axes, [], 0
+    layout = Layout(results["regime"].shape)
+    names = ("regime", "settled", "t_end", "lyapunov", "lyapunov_error")
+    for regime, settled, ended, rate, error in parts(results, *names) if "lyapunov" in results else ():
+        known = (settled == 0) & ~np.isin(regime, _ENDED) & (abs(rate) <= POSITIVE * error)
+        cells = np.flatnonzero(known)
+        indices = dict(zip(axes.sizes, layout.indices(start + cells), strict=True))
+        start += regime.size
+        for structure, own in by_law(scene, axes, indices, len(cells)):
+            values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
+            model = model_of(structure)
+            assert isinstance(model, Continues)
+            change = (abs(rate) + POSITIVE * error).flat[cells[own]] * model.forcing_period(structure, values)
+            needed.append(change / ZERO * ended.flat[cells[own]])
+    spans = np.concatenate([*needed, []])
+    if not np.isfinite(spans).any():
+        return ""
+    half, every = (f"{rounded_up(share(spans[np.isfinite(spans)])):.2g} s" for share in (np.median, np.max))
+    return f"; to show an exponent of 0, that of a torus, takes about {half}" + (
+        f" to {every}" if len(spans) > 1 else ""
+    )
 
 
 def _hint_at_one_word(regime: str, size: int, config: Config) -> None:
