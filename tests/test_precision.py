@@ -115,6 +115,14 @@ class TestErrors:
         assert (rk4["regime_wrong"] == 1).any("cell").all()
         assert (rk4["flagged"] == 1).all()
 
+    def test_rk4_that_converges_to_another_motion_is_told(self, found):
+        assert "rk4 converges to another motion: its median error stays at" in report(found)
+        assert "rad from 100 to 10000 steps" in report(found)
+        falling = np.geomspace(1e-2, 1e-6, 3)[:, np.newaxis]
+        better = found.copy(deep=True)
+        better["error_end"][found["method"].values == "rk4"] = falling
+        assert "another motion" not in report(better)
+
     def test_errors_of_separation_are_given_where_both_runs_separate(self, found, config):
         reference = rerun(found, config, found.attrs["reference"])
         separating = np.isfinite(reference["t_separation"].values)

@@ -51,6 +51,23 @@ def table(ds: xr.Dataset) -> list[list[str]]:
     return [list(rows[0]), *(list(row.values()) for row in rows)]
 
 
+def _another_motion(ds: xr.Dataset) -> list[str]:
+    """A sentence if the error of rk4 stays, beyond rounding, while its steps become a hundred times as many."""
+    rk4 = ds.isel(contender=ds["method"].values == "rk4")
+    steps = [float(str(setting).split()[0]) for setting in rk4["setting"].values]
+    errors = rk4["error_end"].median("cell").values
+    if not len(steps) or not np.inf > errors[-1] > max(
+        1e4 * float(ds["error_end"].median("cell").min()), ds.attrs["target"]
+    ):
+        return []
+    differ = np.flatnonzero(abs(np.log2(errors / errors[-1])) > 1.0)
+    first = steps[differ[-1] + 1 if len(differ) else 0]
+    if steps[-1] < 100.0 * first:
+        return []
+    staying = f"stays at {errors[-1]:.1e} {ds['error_end'].attrs['units']} from {first:g} to {steps[-1]:g} steps"
+    return [f"rk4 converges to another motion: its median error {staying}, none of which meets static friction"]
+
+
 def _verdict(ds: xr.Dataset) -> list[str]:
     """Sentences about sample, reference, cost of certificates and recommended solver."""
     attributes, unit = ds.attrs, ds["error_end"].attrs["units"]
@@ -64,6 +81,7 @@ def _verdict(ds: xr.Dataset) -> list[str]:
     ]
     if "left_out" in attributes:
         words.append(f"left out: {attributes['left_out']}")
+    words += _another_motion(ds)
     solvers = ds["solver"].values.tolist()
     wrong, worst, meets = judge(ds, attributes["target"])
 
