@@ -62,6 +62,14 @@ def test_frames_of_a_history_have_a_row_for_each_sample_or_event(ds):
         run.ringsweep.to_frame("point")
 
 
+def test_map_of_a_mean_of_flags_is_refused_with_what_to_do(ds):
+    mean = ds.mean("drive_amplitude")
+    for use in (mean.ringsweep.map, mean.ringsweep.words, lambda: mean.ringsweep.report("my.html")):
+        with pytest.raises(ringsweep.InputError, match=r"regime: .*\(ds.ringsweep.words\('regime'\) == 'WORD'\).mean"):
+            use()
+    assert mean.ringsweep.map("phi_max")
+
+
 def test_report_has_pictures_thresholds_and_citation_and_needs_no_network(ds, scene, tmp_path):
     ds.ringsweep.report(tmp_path / "my.html")
     page = (tmp_path / "my.html").read_text(encoding="utf-8")

@@ -16,7 +16,15 @@ from ringsweep.errors import InputError
 from ringsweep.plots import look
 from ringsweep.plots.labels import number_text
 from ringsweep.quantities.flags import FAILED, JAMMED
-from ringsweep.quantities.variables import INFERRED, SAMPLED, configuration_of, is_classification, meanings_of, written
+from ringsweep.quantities.variables import (
+    INFERRED,
+    SAMPLED,
+    check_flags,
+    configuration_of,
+    is_classification,
+    meanings_of,
+    written,
+)
 
 
 @dataclass(frozen=True)
@@ -51,6 +59,7 @@ class ColourScale:
                 return cls(palette, colors.Normalize(0.0, 1.0))
             limits = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
             return cls(palette, colors.Normalize(*limits))
+        check_flags(data)
         meanings = meanings_of(data)
         # The colour of a class does not depend on which other classes occur.
         colours = [_WORDS.get(m, colour) for m, colour in zip(meanings.values(), cycle(look.CLASS_COLOURS))]

@@ -331,6 +331,20 @@ def meanings_of(data: xr.DataArray | xr.Variable) -> dict[int, str]:
     return dict(zip(flags, data.attrs["flag_meanings"].split(), strict=True))
 
 
+def check_flags(data: xr.DataArray) -> None:
+    """Refuse a classification whose values lie between flags.
+
+    Raises
+    ------
+    InputError
+        If a value is a number, but not a whole one, as a mean of flags is.
+    """
+    values = data.values.astype(float)
+    if (np.isfinite(values) & (values != np.round(values))).any():
+        over = f"(ds.ringsweep.words({str(data.name)!r}) == 'WORD').mean(...)"
+        raise InputError(str(data.name), f"has values between flags, as a mean has: the share of a word is {over}")
+
+
 def words(data: xr.DataArray) -> xr.DataArray:
     """Names in place of the flags of a classification.
 
@@ -363,6 +377,7 @@ def words(data: xr.DataArray) -> xr.DataArray:
         # A whole dataset has no name.
         name = str(getattr(data, "name", "data"))
         raise InputError(name, "is not a classification, such as ds.regime: it has no flag_values and flag_meanings")
+    check_flags(data)
     meanings = meanings_of(data)
     text = np.full(data.shape, "", dtype=f"<U{max(map(len, meanings.values()))}")
     for value, meaning in meanings.items():
