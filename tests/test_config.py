@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 import ringsweep
-from ringsweep.config import load, read_axes, read_scene, with_values
+from ringsweep.config import load, with_values
 from ringsweep.config.axes import read_spacing
 from ringsweep.config.schema import _number, schema
 from ringsweep.config.solver import read_solver
@@ -73,6 +73,14 @@ def edited(**changes):
         if value is None:
             del node[last]
     return scene
+
+
+def read_scene(scene):
+    return load({"scene": scene}).scene
+
+
+def read_axes(scene, axes):
+    return load({"scene": scene}, axes=axes).axes
 
 
 @pytest.fixture
@@ -167,18 +175,17 @@ class TestPint:
         problem = refusal(quantity, self.REGISTRIES[0](text), Parameter(unit, "something"), "path").problem
         assert "wrong unit" in problem or "not a known unit" in problem
 
-    def test_quantities_make_axes_like_texts(self, write):
+    def test_quantities_make_axes_like_texts(self):
         u = self.REGISTRIES[0]
-        scene = read_scene(load(write(TEXT)).source["scene"])
-        expected = read_axes(scene, {"drive.amplitude": ["20 rpm", "40 rpm"]}).columns["drive.amplitude"][1]
+        expected = read_axes(SCENE, {"drive.amplitude": ["20 rpm", "40 rpm"]}).columns["drive.amplitude"][1]
         speeds = [20, 40] * u("rpm")
         arrays = [xr.DataArray(found, dims="case") for found in (speeds, np.array(list(speeds), dtype=object))]
         for axis in (speeds, list(speeds), (20 * u.rpm, "40 rpm"), *arrays):
-            dims, values = read_axes(scene, {"drive.amplitude": axis}).columns["drive.amplitude"]
+            dims, values = read_axes(SCENE, {"drive.amplitude": axis}).columns["drive.amplitude"]
             assert dims == (("case",) if isinstance(axis, xr.DataArray) else ("drive_amplitude",))
             np.testing.assert_array_equal(values, expected)
-        refusal(read_axes, scene, {"drive.amplitude": [20, 40] * u.Hz})
-        refusal(read_axes, scene, {"drive.amplitude": 20 * u.rpm})
+        refusal(read_axes, SCENE, {"drive.amplitude": [20, 40] * u.Hz})
+        refusal(read_axes, SCENE, {"drive.amplitude": 20 * u.rpm})
 
     def test_quantities_in_a_scene_are_stored_as_text(self, write):
         u = self.REGISTRIES[1]
@@ -508,7 +515,7 @@ class TestFrictionElsewhereHasTwoNames:
         assert list(config.axes.sizes) == [f"friction_{typed}_mu_k", "zone_half_angle"]
         assert load(config.source).axes.sizes == config.axes.sizes
         axes = {f"friction.{typed}.mu_k": [0.05, 0.1]}
-        assert read_axes(read_scene(yaml.safe_load(text)["scene"], axes), axes).sizes == {f"friction_{typed}_mu_k": 2}
+        assert read_axes(yaml.safe_load(text)["scene"], axes).sizes == {f"friction_{typed}_mu_k": 2}
 
     def test_a_setting_changes_the_one_value(self, in_scene, typed, write):
         text = TEXT.replace("    rest:", f"    {in_scene}:")
@@ -529,7 +536,7 @@ def test_both_names_of_friction_elsewhere_at_once_are_one_error(write):
     assert (error.path, error.line) == ("scene.friction.rest", 9)
     assert error.problem == "is another name of friction.elsewhere: keep one of them"
     axes = {"friction.rest.mu_k": [0.1], "friction.elsewhere.mu_s": [0.2], 1: [0.3]}
-    assert refusal(read_scene, SCENE, axes).problem == error.problem
+    assert refusal(read_axes, SCENE, axes).problem == error.problem
 
 
 def test_each_unused_parameter_of_another_law_gives_one_warning(told):
@@ -538,7 +545,7 @@ def test_each_unused_parameter_of_another_law_gives_one_warning(told):
     assert sorted(message.split()[0] for message in found) == [f"scene.{path}" for path in unused]
     scene = read_scene(edited(friction__law="coulomb"))
     assert "friction.alpha" not in scene.values
-    assert "friction.rest.mu_k" in refusal(read_axes, scene, {"friction.rest.mu_s": [0.1]}).problem
+    assert "friction.rest.mu_k" in refusal(read_axes, dict(scene.source), {"friction.rest.mu_s": [0.1]}).problem
 
 
 def test_list_of_arcs_replaces_the_zone_and_without_a_drive_the_ring_rests():
@@ -546,7 +553,7 @@ def test_list_of_arcs_replaces_the_zone_and_without_a_drive_the_ring_rests():
     scene = read_scene(edited(zone=None, friction__rough=None, zones=arcs))
     assert scene.structure.arcs == tuple(f"zones.{i}" for i in range(100))
     assert scene.values["zones.99.center"] == pytest.approx(math.radians(198))
-    assert read_axes(scene, {"zones.1.mu_s": [0.4, 0.5]}).sizes == {"zones_1_mu_s": 2}
+    assert read_axes(dict(scene.source), {"zones.1.mu_s": [0.4, 0.5]}).sizes == {"zones_1_mu_s": 2}
     assert read_scene(edited(drive=None)).structure.drive == "none"
 
 
@@ -663,9 +670,8 @@ def test_paths_with_commas_between_them_vary_together_along_the_dimension_of_the
 
 
 def test_sequences_make_grid_axes_and_dataarrays_share_dimensions():
-    scene = read_scene(SCENE, swept=("ring.radius",))
     axes = read_axes(
-        scene,
+        edited(ring=None),
         {
             "drive.amplitude": np.linspace(1, 2, 3),
             "zone.half_angle": xr.DataArray([10.0, 20.0], dims="case", attrs={"units": "deg"}),
@@ -705,12 +711,12 @@ SWEPT = "drive.amplitude", "ring.radius"
     ],
 )
 def test_wrong_axes_are_refused(axes, problem):
-    assert problem in refusal(read_axes, read_scene(SCENE), axes).problem
+    assert problem in refusal(read_axes, SCENE, axes).problem
 
 
 def test_consistency_of_a_million_cells_is_checked_at_the_corners():
     axes = {path: np.linspace(0.1, 0.2, 1000) for path in ("friction.rough.mu_k", "friction.rough.mu_s")}
-    assert "exceeds mu_s" in refusal(read_axes, read_scene(SCENE), axes).problem
+    assert "exceeds mu_s" in refusal(read_axes, SCENE, axes).problem
 
 
 def test_solver_is_read_with_its_options():
@@ -859,8 +865,7 @@ def test_whole_parameter_refuses_fractions_and_is_an_integer_in_the_schema():
     assert _number(Parameter("1", "seed"))["anyOf"][0]["type"] == "number"
 
 
-def test_scene_and_whole_configuration_in_place_of_each_other_are_refused_with_a_hint():
-    assert "pass config['scene']" in refusal(read_scene, {"scene": SCENE, "solver": SOLVER}).problem
+def test_scene_in_the_place_of_a_configuration_is_refused_with_a_hint():
     assert refusal(load, SCENE).problem == "unknown section: it belongs under `scene`"
 
 
@@ -886,6 +891,13 @@ def test_table_whose_curve_overflows_is_refused_with_its_row(section, table, pat
 def test_beginning_of_a_name_means_the_shortest_name_that_all_others_continue():
     assert nearest_name("t_sep", ["t_end", "t_separation", "t_separation_error"]) == "t_separation"
     assert nearest_name("phi_e", ["t_end", "phi_end_error", "phi_end"]) == "phi_end"
+
+
+def test_result_of_a_sweep_without_axes_is_a_configuration_again(tmp_path):
+    configuration = json.dumps({"scene": SCENE, "sweep": {}})
+    xr.Dataset({"regime": 1}, attrs={"configuration": configuration}).to_netcdf(tmp_path / "one.nc")
+    assert load(tmp_path / "one.nc").axes.sizes == {}
+    assert refusal(load, {"scene": SCENE, "sweep": {}}).problem.startswith("empty")
 
 
 def test_table_that_a_changed_result_names_is_read_with_its_name_told(write, tmp_path, caplog):

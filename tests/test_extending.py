@@ -154,8 +154,8 @@ CLAIMS = {
         assert abs(run(scene, "event")["omega_end"] - 3.0 * np.exp(-1.0)) < 1e-9
     """,
     "the scene of the page is a scene of the disc": f"""
-        from ringsweep.config.configuration import read_scene
-        assert read_scene({ON_DISC["scene"]}).structure.model == "disc"
+        from ringsweep.config import load
+        assert load({{"scene": {ON_DISC["scene"]}}}).scene.structure.model == "disc"
     """,
     "a brake without servo action moves as one contact, and servo action opens a shoe": """
         friction = {"law": "weakening", "rest": {"mu_s": 0.4, "mu_k": 0.3}, "v1": 1.0}

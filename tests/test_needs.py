@@ -8,7 +8,7 @@ import yaml
 
 import ringsweep
 from ringsweep import cli
-from ringsweep.config import load, with_refine
+from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.quantities.flags import FAILED
 from ringsweep.runs import needs
@@ -208,4 +208,4 @@ PEAKS = {512: 354e6, 1024: 465e6, 2048: 505e6, 4096: 892e6}
 
 @pytest.mark.parametrize("side", PEAKS)
 def test_memory_that_is_told_is_what_a_refined_map_took(sweep, side):
-    assert 0.95 < needs.memory_needed(plan_of(with_refine(load(sweep(side)), True)), False) / PEAKS[side] < 1.25
+    assert 0.95 < needs.memory_needed(plan_of(load(sweep(side), refine=True)), False) / PEAKS[side] < 1.25

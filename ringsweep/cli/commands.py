@@ -57,14 +57,14 @@ def run_command(arguments: argparse.Namespace) -> int:
     ringsweep run my.nc -o again.nc    repeat the sweep of my.nc
     ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
     """
-    from ringsweep.config import load, with_refine
+    from ringsweep.config import load
     from ringsweep.runs.plans import plan_of
 
     if arguments.backend == "dask" and arguments.scheduler is None:
         raise InputError("--backend", "dask needs the address of its scheduler: --scheduler ADDRESS")
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
-    config = with_refine(load(arguments.config, arguments.set), arguments.refine or None)
+    config = load(arguments.config, arguments.set, refine=arguments.refine or None)
     name = f"{config.name}.nc" if arguments.output is None else arguments.output
     target, picture = _outputs(name, *plan_of(config).kind, (config.begins_from,))
 

@@ -5,17 +5,12 @@ from ringsweep.config.axes import Axes as Axes
 from ringsweep.config.configuration import Config as Config
 from ringsweep.config.configuration import Setting as Setting
 from ringsweep.config.configuration import as_written as as_written
-from ringsweep.config.configuration import assembled as assembled
 from ringsweep.config.configuration import load as load
-from ringsweep.config.configuration import read_axes as read_axes
-from ringsweep.config.configuration import read_scene as read_scene
 from ringsweep.config.configuration import tell_unit as tell_unit
-from ringsweep.config.configuration import with_refine as with_refine
 from ringsweep.config.configuration import with_values as with_values
 from ringsweep.config.own_files import load_own_files
 from ringsweep.config.scene import as_named as as_named
 from ringsweep.config.scene import sweepable as sweepable
-from ringsweep.config.solver import read_solver as read_solver
 
 # These files may use everything that is imported above.
 load_own_files(OWN_FILES)

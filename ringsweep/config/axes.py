@@ -31,7 +31,11 @@ _SPACINGS = ("linspace", "geomspace")
 #: Index of each of some cells along each dimension, by name of the dimension.
 Indices = Mapping[str, NDArray[np.intp]]
 
-#: A swept path, its place in the configuration (for messages), its dimensions and its values.
+#: A swept path, its place in the configuration (for messages), the path or word that names its dimension, and what is
+#: given: values, a spacing, or a DataArray, which has dimensions of its own.
+Given = tuple[Any, str, str, Any]
+
+#: A swept path, its place in the configuration, its dimensions and its values.
 Column = tuple[str, str, tuple[str, ...], NDArray[Any]]
 
 
@@ -62,9 +66,10 @@ def sweep_section(doc: Document) -> dict[str, Any]:
         section["points"] = doc.inline_csv(section["points"], "sweep.points", "sweep.points")
     if isinstance(sample := section.get("sample"), dict) and isinstance(sample.get("of"), dict):
         _inline_samples(doc, sample["of"])
-    sweep = {key: columns for key, columns in section.items() if key not in ("refine", "follow")}
-    if not sweep:
+    # A program may run a scene without axes, and so does the file of its result.
+    if not section and doc.columns is None and doc.result_axes is None:
         raise InputError("sweep", "empty: give grid, points or sample, or leave sweep out")
+    sweep = {key: columns for key, columns in section.items() if key not in ("refine", "follow")}
     for key in sweep:
         if not section_of(sweep, key, "sweep."):
             raise InputError(f"sweep.{key}", "empty: name at least one path, or leave it out")
@@ -86,13 +91,20 @@ def _inline_samples(doc: Document, of: dict[str, Any]) -> None:
         of[key] = {"values": {path: columns[path] for path in paths_of(key)}}
 
 
-def swept_paths(sweep: dict[str, Any]) -> dict[str, str]:
-    """Every path that the section ``sweep`` varies, with its place in the configuration."""
-    found = {path: f"sweep.points.{path}" for path in sweep.get("points", ())}
+def columns_of(sweep: dict[str, Any]) -> list[Given]:
+    """Columns of the axes in the section ``sweep``."""
+    found = [(path, f"sweep.points.{path}", "point", given) for path, given in sweep.get("points", {}).items()]
+    for key, given in sweep.get("grid", {}).items():
+        paths = paths_of(key)
+        found += [(path, f"sweep.grid.{key}", paths[0], given) for path in paths]
+    return found
+
+
+def swept_paths(sweep: dict[str, Any], columns: Iterable[Given] | None = None) -> dict[str, str]:
+    """Every path that the section ``sweep`` varies, or columns in its place, with its place in the configuration."""
     of = sweep.get("sample", {}).get("of")
-    for key in of if isinstance(of, dict) else ():
-        found |= dict.fromkeys(paths_of(key), f"sweep.sample.of.{key}")
-    return found | {path: f"sweep.grid.{key}" for key in sweep.get("grid", ()) for path in paths_of(key)}
+    found = {path: f"sweep.sample.of.{key}" for key in (of if isinstance(of, dict) else ()) for path in paths_of(key)}
+    return found | {path: where for path, where, *_ in (columns_of(sweep) if columns is None else columns)}
 
 
 def paths_of(key: Any) -> list[Any]:
@@ -100,22 +112,22 @@ def paths_of(key: Any) -> list[Any]:
     return [path.strip() for path in key.split(",")] if isinstance(key, str) else [key]
 
 
-def sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
-    """Axes from the section ``sweep`` of a configuration."""
+def read_columns(scene: Scene, columns: Iterable[Given]) -> Iterator[Column]:
+    """Columns with their values.
+
+    Raises
+    ------
+    InputError
+        If a path is none of the scene, or a value is wrong.
+    """
     known = sweepable(scene)
-
-    def columns() -> Iterator[Column]:
-        for path, given in sweep.get("points", {}).items():
-            where = f"sweep.points.{path}"
-            yield path, where, ("point",), read_values(given, swept_parameter(known, path, where), where)
-        for key, given in sweep.get("grid", {}).items():
-            where, read = f"sweep.grid.{key}", read_spacing if isinstance(given, dict) else read_values
-            first, *_ = paths = paths_of(key)
-            for path in paths:
-                parameter = swept_parameter(known, path, where)
-                yield path, where, (dimension(first),), read(given, parameter, where)
-
-    return build_axes(columns())
+    for path, where, along, given in columns:
+        parameter = swept_parameter(known, path, where)
+        if hasattr(given, "dims"):
+            yield path, where, *read_data_array(given, parameter, where)
+        else:
+            read = read_spacing if isinstance(given, dict) else read_values
+            yield path, where, (dimension(along),), read(given, parameter, where)
 
 
 def swept_parameter(known: Mapping[str, Parameter | Choice], path: object, where: str) -> Parameter | Choice:

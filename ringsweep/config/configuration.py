@@ -6,30 +6,19 @@ Physics and solvers declare their parameters; error messages are made from these
 
 from __future__ import annotations
 
-import dataclasses
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from ringsweep.config import yaml_text
-from ringsweep.config.axes import (
-    Axes,
-    Column,
-    build_axes,
-    dimension,
-    paths_of,
-    read_data_array,
-    sweep_axes,
-    sweep_section,
-    swept_parameter,
-    swept_paths,
-)
+from ringsweep.config.axes import Axes, Given, build_axes, columns_of, read_columns, sweep_section, swept_paths
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.follow import Follow, put_state, read_follow, run_to_continue, with_direction
 from ringsweep.config.refine import Refinement, read_refinement
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
-from ringsweep.config.sections import read_values, suggestion, warn_once
+from ringsweep.config.sections import suggestion, warn_once
 from ringsweep.config.solver import read_solver
 from ringsweep.config.uncertain import Sample, read_sample
 from ringsweep.config.yaml_text import Document, scalar
@@ -44,11 +33,14 @@ Setting = str | tuple[str, Any]
 
 _SECTIONS = "scene", "solver", "record", "sweep"
 
-_NOT_FOLLOWED = "cannot stand beside sweep.follow, by which each cell needs the one before: leave one of them out"
-
-_NO_SECTION = "cannot stand beside record.section: {}; leave one of them out"
-
-_NOT_REFINED = "cannot stand beside sweep.sample: a probability has no boundary, and each cell needs its own runs"
+# Parts of a configuration that exclude each other, and why.
+_EXCLUDING = (
+    ("refine", "sample", "a probability has no boundary, and each cell needs its own runs"),
+    ("refine", "section", "cells that are inferred have no points"),
+    ("sample", "section", "a probability has no points"),
+    ("refine", "follow", "each cell needs the one before"),
+    ("sample", "follow", "each cell needs the one before"),
+)
 
 
 @dataclass(frozen=True)
@@ -94,7 +86,13 @@ class Config:
         return bool(getattr(self.solver, "certify", True))
 
 
-def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[Setting] = ()) -> Config:
+def load(
+    config: str | os.PathLike[str] | Mapping[str, Any],
+    settings: Iterable[Setting] = (),
+    *,
+    axes: Mapping[str, Any] | None = None,
+    **parts: Any,
+) -> Config:
     """Read and validate a configuration.
 
     Parameters
@@ -103,55 +101,27 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[
         A YAML file, the mapping that it would hold, or a result file, which holds its configuration.
     settings : iterable of str or tuple
         Values to change, as for :func:`with_values`; none that is swept.
+    axes : mapping of str to sequence or DataArray, optional
+        Axes that take the place of the section ``sweep``. A sequence of shape ``(n,)`` makes a dimension for its path.
+        A DataArray brings its dimensions, which it shares with other DataArrays, and its ``units``.
+    **parts
+        What takes the place of ``solver``, ``record``, ``sweep.refine`` or ``sweep.follow``. None keeps what is there,
+        and so does True.
 
     Raises
     ------
     InputError
         If something in it is wrong. The message names the place, the value and what is allowed.
     """
-    doc = yaml_text.read(config)
+    doc = _document(config, parts, axes)
     with doc.locating_errors():
-        swept = swept_paths(sweep_section(doc)) if settings else {}
-        changed = _apply_settings(doc, settings)
-        for path in changed:
-            if path.removeprefix("scene.") in swept:
-                raise InputError(path, "is swept here: --set changes values that all cells share")
-        found = _validate(doc)
-        if doc.result_axes is not None and doc.result_axes.keys() != found.axes.columns.keys():
-            raise InputError(
-                "", "is damaged, or a part of a result: its coordinates are not the axes that it was run with"
-            )
-    _tell_units(changed, found.scene)
-    if doc.result_axes is None:
-        return found
-    # A configuration cannot name the dimensions that axes share; the coordinates of a result file can.
-    columns = ((path, path, dims, values) for path, (dims, values) in doc.result_axes.items())
-    return dataclasses.replace(found, axes=with_direction(build_axes(columns), found.follow))
-
-
-def with_refine(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
-    """A configuration with `refine` in the place of its ``sweep.refine``; None and True keep one that it has.
-
-    Raises
-    ------
-    InputError
-        If `refine` is wrong, or the sweep is no grid.
-    """
-    if refine is None or (refine is True and config.refine is not None):
-        return config
-    given = yaml_text.read({"refine": refine}).tree["refine"]
-    found = read_refinement(given, config.scene, config.axes)
-    sweep = {key: value for key, value in config.source.get("sweep", {}).items() if key != "refine"}
-    if found is not None:
-        sweep["refine"] = given
-    source = config.source | ({"sweep": sweep} if sweep else {})
-    return _checked(dataclasses.replace(config, refine=found, source=source))
+        return _validate(doc, _apply_settings(doc, settings))
 
 
 def with_values(
     config: str | os.PathLike[str] | Mapping[str, Any],
     settings: Iterable[Setting] = (),
-    solver: Mapping[str, Any] | None = None,
+    solver: str | Mapping[str, Any] | None = None,
 ) -> Config:
     """Configuration of a single run: without axes, and with some values changed.
 
@@ -165,7 +135,7 @@ def with_values(
         ``"PATH=VALUE"`` with a path in the scene (``drive.amplitude=3``) or in the solver (``solver.steps=100``), as a
         user types it: a number without unit in the place of ``60 deg`` is taken in SI units, with a warning. A program
         gives path and value as a tuple, without a warning.
-    solver : mapping, optional
+    solver : str or mapping, optional
         Section ``solver`` that takes the place of the configuration's.
 
     Raises
@@ -173,54 +143,48 @@ def with_values(
     InputError
         If configuration or settings are wrong, or a value is missing that only the sweep gives.
     """
-    doc = yaml_text.read(config)
-    if solver is not None:
-        doc.tree["solver"] = yaml_text.read({"solver": solver}).tree["solver"]
-        doc.locations = {path: line for path, line in doc.locations.items() if path.partition(".")[0] != "solver"}
+    doc = _document(config, {"solver": solver})
     with doc.locating_errors():
         changed = _apply_settings(doc, settings)
         sweep = sweep_section(doc)
         doc.tree.pop("sweep", None)
+        doc.result_axes = None
         if LAW in sweep.get("grid", {}) and f"scene.{LAW}" not in changed:
             doc.tree["sweep"] = {"grid": {LAW: sweep["grid"][LAW]}}
         try:
-            found = _validate(doc)
+            return _validate(doc, changed)
         except InputError as error:
             path = error.path.removeprefix("scene.")
             if path in swept_paths(sweep) and error.problem.startswith("missing"):
                 error.problem = f"missing: it is swept here, and one run needs one value: --set {path}=VALUE"
             raise
-    _tell_units(changed, found.scene)
-    return found
 
 
-def read_scene(scene: Mapping[str, Any], swept: Collection[str] = (), record: Mapping[str, Any] | None = None) -> Scene:
-    """Read and validate the mappings under ``scene`` and ``record`` in a configuration.
-
-    Parameters
-    ----------
-    scene : mapping
-    swept : collection of str, or mapping of str to sequence
-        Paths that a sweep will fill. Their values may be missing, and :func:`read_axes` looks for contradictions
-        between values. If friction laws are swept, `swept` must be a mapping that names them.
-    record : mapping, optional
-
-    Raises
-    ------
-    InputError
-        If something in it is wrong, or it is a whole configuration.
-    """
-    if isinstance(scene, Mapping) and "scene" in scene:
-        raise InputError("scene", "this is a whole configuration: pass config['scene']")
-    laws = (f"axes[{LAW!r}]", swept[LAW]) if isinstance(swept, Mapping) and LAW in swept else None
-    given = {"scene": scene} | ({"record": record} if record is not None else {})
-    found = parse_scene(Document(yaml_text.read(given).tree), swept, laws)
-    if not swept:
-        check_consistency(found, Axes())
-    return found
+def _document(
+    config: str | os.PathLike[str] | Mapping[str, Any],
+    parts: Mapping[str, Any],
+    axes: Mapping[str, Any] | None = None,
+) -> Document:
+    """A configuration in which a program has put axes and other parts in the place of its own; see :func:`load`."""
+    doc = yaml_text.read(config)
+    if axes is not None:
+        if not isinstance(axes, Mapping):
+            raise InputError("axes", f"a mapping of paths to values is expected, got {show(axes)}")
+        doc.tree["sweep"], doc.result_axes = {}, None
+        doc.columns = [(path, f"axes[{path!r}]", path, given) for path, given in axes.items()]
+    for key, given in parts.items():
+        place, section = (key, doc.tree) if key in _SECTIONS else (f"sweep.{key}", doc.tree.get("sweep", {}))
+        if given is None or not isinstance(section, dict) or (given is True and section.get(key)):
+            continue
+        if section is not doc.tree:
+            doc.tree["sweep"] = section
+        section[key] = yaml_text.read({key: given}).tree[key]
+        doc.locations = {path: line for path, line in doc.locations.items() if not f"{path}.".startswith(f"{place}.")}
+    return doc
 
 
-def _validate(doc: Document) -> Config:
+def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingProxyType({})) -> Config:
+    """The configuration of a document, in which a user has changed some values."""
     tree = doc.tree
     for key in tree:
         if key not in _SECTIONS:
@@ -228,8 +192,12 @@ def _validate(doc: Document) -> Config:
             hint = ": it belongs under `scene`" if "model" in tree else suggestion(key, _SECTIONS)
             raise InputError(key, "unknown section" + hint)
     sweep = sweep_section(doc)
-    swept = swept_paths(sweep)
-    laws = next(((f"sweep.{kind}.{LAW}", columns[LAW]) for kind, columns in sweep.items() if LAW in columns), None)
+    columns = columns_of(sweep) if doc.columns is None else doc.columns
+    swept = swept_paths(sweep, columns)
+    for path in changed:
+        if path.removeprefix("scene.") in swept:
+            raise InputError(path, "is swept here: --set changes values that all cells share")
+    laws = next(((where, given) for path, where, _, given in columns if path == LAW), None)
     if (file := run_to_continue(doc)) is not None:
         try:
             before = load(file)
@@ -238,46 +206,39 @@ def _validate(doc: Document) -> Config:
         put_state(doc, parse_scene(doc, swept, laws), file, before.scene, before.axes, swept)
     scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
-    axes = sweep_axes(scene, sweep)
-    if doc.result_axes is None and doc.locations:
-        _warn_of_plain_angles(scene, {**sweep.get("points", {}), **sweep.get("grid", {})})
+    if doc.result_axes is None:
+        axes = build_axes(read_columns(scene, columns))
+    elif doc.result_axes.keys() == {path for path, *_ in columns}:
+        # A configuration cannot name the dimensions that axes share; the coordinates of a result file can.
+        axes = build_axes((path, path, dims, values) for path, (dims, values) in doc.result_axes.items())
+    else:
+        raise InputError("", "is damaged, or a part of a result: its coordinates are not the axes that it was run with")
+    if doc.result_axes is None and doc.columns is None and doc.locations:
+        _warn_of_plain_angles(scene, columns)
     for path, where in swept.items():
         if where in doc.locations:
             doc.locations[f"scene.{path}"] = doc.locations[where]
     if (sample := read_sample(sweep.get("sample"), scene, axes)) is None:
         check_consistency(scene, axes)
-    return assembled(Config(scene, solver, axes, tree, doc.name, sample=sample, begins_from=file))
+    given = tree.get("sweep", {})
+    refine, follow = read_refinement(given.get("refine"), scene, axes), read_follow(given.get("follow"), scene, axes)
+    parts = {"refine": refine, "sample": sample, "follow": follow, "section": scene.structure.section}
+    for one, other, why in _EXCLUDING:
+        if parts[one] is not None and parts[other] is not None:
+            beside = f"record.{other}" if other == "section" else f"sweep.{other}"
+            raise InputError(f"sweep.{one}", f"cannot stand beside {beside}: {why}; leave one of them out")
+    _tell_units(changed, scene)
+    axes = with_direction(axes, follow)
+    return Config(scene, solver, axes, tree, doc.name, refine, sample, follow, begins_from=file)
 
 
-def assembled(config: Config) -> Config:
-    """A configuration with what its source says under ``sweep.refine`` and ``sweep.follow``."""
-    scene, axes, sweep = config.scene, config.axes, config.source.get("sweep", {})
-    refine, follow = read_refinement(sweep.get("refine"), scene, axes), read_follow(sweep.get("follow"), scene, axes)
-    return _checked(dataclasses.replace(config, axes=with_direction(axes, follow), refine=refine, follow=follow))
-
-
-def _checked(config: Config) -> Config:
-    """A configuration, unless two parts of its sweep, or a part and a section, exclude each other."""
-    if config.refine is not None and config.sample is not None:
-        raise InputError("sweep.refine", _NOT_REFINED)
-    lacks = {"refine": "cells that are inferred have no points", "sample": "a probability has no points"}
-    for key in [key for key in lacks if getattr(config, key) is not None]:
-        if config.scene.structure.section is not None:
-            raise InputError(f"sweep.{key}", _NO_SECTION.format(lacks[key]))
-        if config.follow is not None:
-            raise InputError(f"sweep.{key}", _NOT_FOLLOWED)
-    return config
-
-
-def _warn_of_plain_angles(scene: Scene, columns: Mapping[str, Any]) -> None:
+def _warn_of_plain_angles(scene: Scene, columns: Iterable[Given]) -> None:
     """Warn of angles of many turns among the axes that a file gives. Axes that a program gives are in SI units."""
     known = sweepable(scene)
-    for key, given in columns.items():
+    for path, _, _, given in columns:
         # Of linspace and geomspace, first and last.
-        ends = next(iter(given.values()))[:2] if isinstance(given, dict) else given
-        for path in paths_of(key):
-            for value in ends:
-                warn_of_plain_angle(path, value, known[path])
+        for value in next(iter(given.values()))[:2] if isinstance(given, dict) else given:
+            warn_of_plain_angle(path, value, known[path])
 
 
 def _apply_settings(doc: Document, settings: Iterable[Setting]) -> dict[str, tuple[Any, Any]]:
@@ -334,9 +295,10 @@ def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parame
 
 def as_written(config: Config, path: str) -> Any:
     """A number as a configuration gives it, with its unit: in the scene, or else first on its axis; or None."""
-    node, sweep = written(config.source, path), config.source.get("sweep", {})
-    for columns in (sweep.get("grid", {}), sweep.get("points", {})):
-        node = columns.get(path) if node is None else node
+    node = written(config.source, path)
+    if node is None:
+        columns = columns_of(config.source.get("sweep", {}))
+        node = next((given for one, _, _, given in columns if one == path), None)
     while node and isinstance(node, dict | list):
         node = next(iter(node.values())) if isinstance(node, dict) else node[0]
     return node
@@ -371,39 +333,3 @@ def _child(node: Any, key: str, full: str) -> Any:
     if isinstance(node, list) and key.isdecimal() and len(key) < 10 and int(key) < len(node):
         return node[int(key)]
     raise InputError(full, f"cannot be set: there is no `{key}` on this path")
-
-
-def read_axes(scene: Scene, axes: Mapping[str, Any]) -> Axes:
-    """Read and validate the axes of a sweep given in Python.
-
-    Parameters
-    ----------
-    scene : Scene
-    axes : mapping of str to sequence or DataArray
-        A sequence of shape ``(n,)`` makes a dimension for its path. A DataArray brings its dimensions, which it shares
-        with other DataArrays, and its ``units``.
-
-    Raises
-    ------
-    InputError
-        If a path or value is wrong, or values contradict each other in some cell.
-    """
-    # xarray is slow to import; an error in a configuration should not wait for it.
-    import xarray as xr
-
-    if not isinstance(axes, Mapping):
-        raise InputError("axes", f"a mapping of paths to values is expected, got {show(axes)}")
-    known = sweepable(scene)
-
-    def columns() -> Iterator[Column]:
-        for path, given in axes.items():
-            where = f"axes[{path!r}]"
-            parameter = swept_parameter(known, path, where)
-            if isinstance(given, xr.DataArray):
-                yield path, where, *read_data_array(given, parameter, where)
-            else:
-                yield path, where, (dimension(path),), read_values(given, parameter, where)
-
-    found = build_axes(columns())
-    check_consistency(scene, found)
-    return found

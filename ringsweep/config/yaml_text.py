@@ -55,6 +55,8 @@ class Document:
         File and line of each dotted path.
     result_axes : dict of str to tuple, optional
         Only from a result file: dimensions and values of each swept path. The tree lists points along one dimension.
+    columns : list of tuple, optional
+        Axes that a program gives in the place of the section ``sweep``; see :data:`ringsweep.config.axes.Given`.
     """
 
     tree: dict[str, Any]
@@ -62,6 +64,7 @@ class Document:
     name: str = "ringsweep"
     locations: dict[str, tuple[str, int | None]] = field(default_factory=dict)
     result_axes: dict[str, tuple[tuple[str, ...], Any]] | None = None
+    columns: list[tuple[Any, str, str, Any]] | None = None
 
     @contextmanager
     def locating_errors(self) -> Iterator[None]:

@@ -16,8 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Axes, Config, assembled, load, read_axes, read_scene, read_solver, with_refine
-from ringsweep.config.yaml_text import read
+from ringsweep.config import Axes, Config, load
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import error_attribute
 from ringsweep.runs.cells import TaskResult, kernels_of
@@ -116,8 +115,7 @@ def run(
     >>> bool((ds.certified == 1).all())
     True
     """
-    loaded = with_refine(load(config), refine)
-    return _run(loaded, output, Execution(jobs, scheduler, progress), fresh, reuse)
+    return _run(load(config, refine=refine), output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
 def _run(
@@ -198,20 +196,10 @@ def sweep(
     if hasattr(axes, "itertuples"):
         axes = {str(path): xr.DataArray(column.to_numpy(), dims="point") for path, column in axes.items()}
     given: Any = scene
-    is_whole = isinstance(given, str | os.PathLike) or (isinstance(given, Mapping) and "scene" in given)
-    whole: Mapping[str, Any] = load(given).source if is_whole else {"scene": given}
-    record = whole.get("record") if record is None else record
-    solver = whole.get("solver", "auto") if solver is None else solver
-    parsed = read_scene(whole["scene"], axes, record)
-    found = read_axes(parsed, axes)
-    method = read_solver(solver, parsed)
-    of_method = {"method": solver} if isinstance(solver, str) else dict(solver)
-    also = {key: value for key, value in (("follow", follow), ("refine", refine)) if value not in (None, False)}
-    section = _sweep_section(found) | read(also).tree
-    source = {"scene": dict(parsed.source), "solver": of_method, "sweep": section}
-    if record is not None:
-        source["record"] = dict(record)
-    config = assembled(Config(parsed, method, found, source, name="ringsweep"))
+    if not (isinstance(given, str | os.PathLike) or (isinstance(given, Mapping) and "scene" in given)):
+        given = {"scene": given}
+    config = load(given, axes=axes, solver=solver, record=record, refine=refine or None, follow=follow or None)
+    config.source["sweep"] |= _sweep_section(config.axes)
     return _run(config, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
