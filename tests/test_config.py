@@ -23,7 +23,6 @@ import ringsweep
 from ringsweep.config import load, with_values
 from ringsweep.config.axes import read_spacing
 from ringsweep.config.schema import _number, schema
-from ringsweep.config.solver import read_solver
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.quantity import cf_units
@@ -720,11 +719,16 @@ def test_consistency_of_a_million_cells_is_checked_at_the_corners():
 
 
 def test_solver_is_read_with_its_options():
-    solver = read_solver({"method": "rk4", "steps": 10, "certify": False})
-    assert (solver.steps, solver.certify) == (10, False)
-    assert "needs it" in refusal(read_solver, "rk4").problem
-    assert "did you mean `rk4`?" in refusal(read_solver, "rk45").problem
-    assert "true or false" in refusal(read_solver, {"method": "rk4", "steps": 10, "certify": "yes"}).problem
+    config = load({"scene": SCENE, "solver": {"method": "rk4", "steps": 10, "certify": False}})
+    assert (config.solver.steps, config.solver.certify) == (10, False)
+    assert load({"scene": SCENE, "solver": {"method": "implicit", "rtol": 1e-8}}).solver.rtol == 1e-8
+    for solver, problem in (
+        ("rk4", "missing: steps over the span of time (for example `steps: 5000`)"),
+        ("rk45", "did you mean `rk4`?"),
+        ({"method": "rk4", "steps": 10, "certify": "yes"}, "true or false"),
+        ({"method": "implicit", "rtoll": 1}, "unknown key; did you mean `rtol`?"),
+    ):
+        assert problem in refusal(load, {"scene": SCENE, "solver": solver}).problem
 
 
 @pytest.mark.parametrize("solver", [3, ["rk4"]])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.axes import Axes
-from ringsweep.config.sections import check_keys, one_of, suggestion
+from ringsweep.config.sections import Key, Keys, read_keys, suggestion
 from ringsweep.config.yaml_text import Document, is_result
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, model_of
@@ -23,11 +23,18 @@ from ringsweep.quantities.units import show
 #: Dimension of a sweep that follows its axis in both directions, and its values.
 DIRECTION, BOTH = "direction", ("up", "down")
 
-#: Values of ``sweep.follow.direction``, and what they mean.
-DIRECTIONS = {
-    "up": "from the least value to the greatest",
-    "down": "from the greatest value to the least",
-    "both": "up and down, along the dimension direction",
+#: Keys of ``sweep.follow``.
+KEYS: Keys = {
+    "axis": Key("a path that the sweep varies", example="force.frequency"),
+    "direction": Key(
+        "direction",
+        {
+            "up": "from the least value to the greatest",
+            "down": "from the greatest value to the least",
+            "both": "up and down, along the dimension direction",
+        },
+        "up",
+    ),
 }
 
 # Drives that are the same at all times, or whose phase a scene can have.
@@ -43,7 +50,7 @@ class Follow:
     path : str
         Path of the axis.
     direction : str
-        A key of :data:`DIRECTIONS`.
+        ``up``, ``down`` or ``both``.
     """
 
     path: str
@@ -71,16 +78,12 @@ def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
     """
     if given is None:
         return None
-    section = given if isinstance(given, dict) else {"axis": given}
-    check_keys(section, ("axis", "direction"), "sweep.follow")
+    section = read_keys(given if isinstance(given, dict) else {"axis": given}, KEYS, "sweep.follow")
     where = "sweep.follow.axis" if isinstance(given, dict) else "sweep.follow"
-    if "axis" not in section:
-        raise InputError(where, "missing: name a path that the sweep varies (for example `axis: force.frequency`)")
     path = section["axis"]
     numeric = [name for name in axes.columns if name != LAW]
     if not isinstance(path, str) or path not in numeric:
         raise InputError(where, f"the sweep varies no number {show(path)}" + suggestion(path, numeric))
-    direction = one_of(section.get("direction", "up"), DIRECTIONS, "sweep.follow.direction", "is no direction")
     dims, _ = axes.columns[path]
     if len(dims) > 1:
         raise InputError(where, f"{path} varies along {' and '.join(dims)}: follow a path with one dimension")
@@ -93,7 +96,7 @@ def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
         raise InputError(where, f"the dimension {DIRECTION} of the sweep has the name of that of a followed one")
     for structure in scene.structures.values():
         _check_continues(structure, where)
-    return Follow(path, direction)
+    return Follow(path, section["direction"])
 
 
 def with_direction(axes: Axes, follow: Follow | None) -> Axes:

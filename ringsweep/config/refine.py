@@ -9,18 +9,21 @@ import numpy as np
 
 from ringsweep.config.axes import Axes, dimension
 from ringsweep.config.scene import outcome_numbers
-from ringsweep.config.sections import check_keys, one_of
+from ringsweep.config.sections import Key, Keys, one_of, read_keys
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
 
-#: Keys of ``sweep.refine`` with a number.
-NUMBERS = {
+#: Keys of ``sweep.refine``.
+KEYS: Keys = {
     "stride": Parameter("1", "cells from one cell of the first round to the next", lower=1, upper=1024, whole=True,
                         default=32),
     "audit": Parameter("1", "share of the inferred cells that is computed after all", lower=0, upper=1, default=0.02),
+    "also": Key("number that is interpolated where not run"),
+    "within": Key("largest error of that"),
+    "axes": Key("one or two paths that are refined (default: the longest two)"),
 }  # fmt: skip
 
 
@@ -66,16 +69,9 @@ def read_refinement(given: Any, scene: Scene, axes: Axes) -> Refinement | None:
     """
     if given is None or given is False:
         return None
-    section = {} if given is True else given
-    if not isinstance(section, dict):
-        raise InputError("sweep.refine", f"a section with keys, or true, is expected, got {show(given)}")
-    check_keys(section, (*NUMBERS, "also", "within", "axes"), "sweep.refine")
-    values = {
-        key: quantity(section.get(key, parameter.default), parameter, f"sweep.refine.{key}")
-        for key, parameter in NUMBERS.items()
-    }
-    also, within = _also(section, scene)
-    return Refinement(_dims(section.get("axes"), axes), int(values["stride"]), values["audit"], also, within)
+    section = read_keys({} if given is True else given, KEYS, "sweep.refine")
+    also, within = _also(section["also"], section["within"], scene)
+    return Refinement(_dims(section["axes"], axes), section["stride"], section["audit"], also, within)
 
 
 def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
@@ -102,15 +98,15 @@ def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
     return tuple(dimension(path) for path in names if path in chosen)
 
 
-def _also(section: dict[str, Any], scene: Scene) -> tuple[str | None, float | None]:
+def _also(also: Any, within: Any, scene: Scene) -> tuple[str | None, float | None]:
     """The variable that is interpolated, and its largest error."""
-    for there, lacks in (("also", "within"), ("within", "also")):
-        if there in section and lacks not in section:
+    if also is None and within is None:
+        return None, None
+    for there, lacks, given in (("also", "within", within), ("within", "also", also)):
+        if given is None:
             problem = f"missing: `{there}` needs it, for example `also: t_separation, within: 1e-3`"
             raise InputError(f"sweep.refine.{lacks}", problem)
-    if "also" not in section:
-        return None, None
-    also = one_of(section["also"], outcome_numbers(scene), "sweep.refine.also", "is no number of this model")
-    unit = model_of(scene.structure).variables[also].unit
-    error = Parameter(unit, f"largest error of {also} where it is interpolated", lower=0, open_lower=True)
-    return also, quantity(section["within"], error, "sweep.refine.within")
+    name = one_of(also, outcome_numbers(scene), "sweep.refine.also", "is no number of this model")
+    unit = model_of(scene.structure).variables[name].unit
+    error = Parameter(unit, f"largest error of {name} where it is interpolated", lower=0, open_lower=True)
+    return name, quantity(within, error, "sweep.refine.within")

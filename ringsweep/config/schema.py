@@ -10,23 +10,24 @@ from itertools import product
 from typing import Any
 
 from ringsweep.config.axes import COUNT
-from ringsweep.config.follow import DIRECTIONS
+from ringsweep.config.follow import KEYS as FOLLOW
 from ringsweep.config.own import FORMULA, TABLE_LAW
-from ringsweep.config.record import INSTANTS, KEEP, PERIOD
-from ringsweep.config.refine import NUMBERS
+from ringsweep.config.record import RECORD, SECTION
+from ringsweep.config.refine import KEYS as REFINE
 from ringsweep.config.scene import as_named
+from ringsweep.config.sections import Keys
+from ringsweep.config.solver import options_of
 from ringsweep.config.tables import INTERPOLATIONS, TABLES
-from ringsweep.config.uncertain import NUMBERS as SAMPLE_NUMBERS
+from ringsweep.config.uncertain import KEYS as SAMPLE
 from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.formula import COEFFICIENTS
 from ringsweep.physics.friction.laws import Table
-from ringsweep.quantities.parameters import Parameter, declared
+from ringsweep.quantities.parameters import Parameter
 from ringsweep.solvers import METHODS
 from ringsweep.statistics import DISTRIBUTIONS
-from ringsweep.statistics import METHODS as DESIGNS
 
 
 def schema() -> dict[str, Any]:
@@ -76,7 +77,13 @@ def schema() -> dict[str, Any]:
     for section, what in {"friction": "friction law", "drive": "drive", "force": "force"}.items():
         own_parameter = Parameter("", f"parameter of a {what} by formula")
         scene["properties"][section]["additionalProperties"] = _number(own_parameter)
-    sections = {"scene": scene, "solver": _solver(), "record": _record(), "sweep": _sweep(list(known))}
+    record = _section(_keys(RECORD, section=_section(_keys(SECTION), "at")))
+    sections = {
+        "scene": scene,
+        "solver": _solver(),
+        "record": {"description": "what a run records", **record},
+        "sweep": _sweep(list(known)),
+    }
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "ringsweep configuration"}
     return head | _section(sections, "scene")
 
@@ -171,25 +178,26 @@ def _word(about: str, meanings: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _constants(meanings: Mapping[str, str]) -> list[dict[str, str]]:
-    return [{"const": name, "description": meaning} for name, meaning in meanings.items()]
+    return [{"const": name} | ({"description": text} if text else {}) for name, text in meanings.items()]
 
 
-def _record() -> dict[str, Any]:
-    at = _word("instants of the points", INSTANTS)
-    section = _section({"at": at, "keep": _number(KEEP), "period": _number(PERIOD)}, "at")
-    kept = {"description": "points of the motion that a run keeps", **section}
-    exponent = {"description": "whether a run tells its Lyapunov exponent and its Floquet multipliers", **_FLAG}
-    return {"description": "what a run records", **_section({"exponent": exponent, "section": kept})}
+def _keys(keys: Keys, **others: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Schemas of the values under the keys of a section; `others` are those that a function of their own reads."""
+    found = {}
+    for name, key in keys.items():
+        if isinstance(key, Parameter):
+            found[name] = _number(key)
+        elif key.names is not None:
+            found[name] = _word(key.long_name, key.names)
+        else:
+            found[name] = {"description": key.long_name, **others.get(name, _FLAG)}
+    return found
 
 
 def _solver() -> dict[str, Any]:
     methods: list[dict[str, Any]] = [{"type": "string", "enum": list(METHODS)}]
-    method: Any
     for name, method in METHODS.items():
-        numbers = declared(method)
-        options: dict[str, Any] = {"method": {"const": name, "description": _first_line(method)}}
-        for option in dataclasses.fields(method):
-            options[option.name] = _number(numbers[option.name]) if option.name in numbers else _FLAG
+        options = {"method": {"const": name, "description": _first_line(method)}, **_keys(options_of(method))}
         methods.append(_section(options, "method"))
     return _either("how time advances", *methods)
 
@@ -202,18 +210,13 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(_VALUE), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
-    refined = {
-        **{key: _number(parameter) for key, parameter in NUMBERS.items()},
-        "also": _text("number that is interpolated where not run"),
-        "within": {"description": "largest error of that", **_VALUE},
-        "axes": _list(names, "one or two paths that are refined (default: the longest two)", maxItems=2),
-    }
+    refined = _keys(REFINE, also=_TEXT, within=_VALUE, axes=_list(names, maxItems=2))
     grid = "path -> values; every combination is run; paths with commas between them vary together"
     of_laws = {LAW: laws | {"uniqueItems": True}}
     points = "CSV file whose columns are paths and whose rows are runs, or its columns"
     columns = _open("path -> values", _list(_VALUE), propertyNames=names, properties={LAW: laws})
     which = "axis along which each cell starts from the state in which the one before ended"
-    followed = _section({"axis": _TEXT, "direction": {"oneOf": _constants(DIRECTIONS)}}, "axis")
+    followed = _section(_keys(FOLLOW, axis=_TEXT), "axis")
     boundaries = "compute only the boundaries of the map: every 32nd cell, then where neighbours differ"
     return _section(
         {
@@ -237,18 +240,12 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
     kinds["values"] = _either("values, each as probable as the others", _list(_VALUE), columns)
     kinds["file"] = _text("CSV file with a column for each path; a row is a draw")
     kinds["over"] = _text("path that the draw is multiplied by")
-    indices = "Sobol indices, and of which variables beside the regimes"
     drawn = "path -> distribution; paths with commas between them are drawn together"
-    found = _section(
-        {
-            **{key: _number(parameter) for key, parameter in SAMPLE_NUMBERS.items()},
-            "method": {"description": "how points are drawn", "enum": [*DESIGNS]},
-            "of": _open(drawn, _section(kinds), propertyNames=names, minProperties=1),
-            "quantiles": _open("variable -> levels", _list(_VALUE)),
-            "survival": {"description": "times at which it is asked whether the contacts still hold", **axis},
-            "sensitivity": _either(indices, _FLAG, _section({"of": _list(_TEXT)}, "of")),
-            "keep": {"description": "whether the result holds the runs too", **_FLAG},
-        },
-        *("n", "of"),
-    )
+    others = {
+        "of": _open(drawn, _section(kinds), propertyNames=names, minProperties=1),
+        "quantiles": {"type": "object", "additionalProperties": _list(_VALUE)},
+        "survival": axis,
+        "sensitivity": {"anyOf": [_FLAG, _section({"of": _list(_TEXT)}, "of")]},
+    }
+    found = _section(_keys(SAMPLE, **others), *("n", "of"))
     return {"description": "uncertain parameters: each cell of the grid is sampled", **found}

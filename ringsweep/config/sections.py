@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -48,13 +49,6 @@ def one_of(given: Any, known: Iterable[str], path: str, problem: str) -> str:
     return given
 
 
-def boolean(given: Any, path: str) -> bool:
-    """The value given, which must be true or false."""
-    if not isinstance(given, bool):
-        raise InputError(path, f"true or false is expected, got {show(given)}")
-    return given
-
-
 def missing_text(path: str, parameter: Parameter) -> str:
     """Message about a missing value: what it means, its unit and an example."""
     examples = {"rad": "15 deg", "m": "10 mm", "1": "0.2", "": "1"}
@@ -94,6 +88,60 @@ def _registered(given: object, known: Iterable[str], path: str, what: str) -> st
     """The name of a part of the package, or of one that a user's own file defines."""
     own = ", and no file that the environment variable RINGSWEEP_LAWS names defines it"
     return one_of(given, known, path, f"is not a {what}" + (own if nearest_name(given, known) is None else ""))
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a section whose value is no number.
+
+    Attributes
+    ----------
+    long_name : str
+    names : mapping of str to str, optional
+        Names to choose from, and what each says; empty texts if the names tell it.
+    default : str or bool, optional
+        A default that is true or false allows nothing else.
+    example : str
+        A value, for the message about a key that is missing; without one it may be.
+    """
+
+    long_name: str
+    names: Mapping[str, str] | None = None
+    default: str | bool | None = None
+    example: str = ""
+
+
+#: What a section may hold under each of its keys. Reader and schema follow from it.
+Keys = Mapping[str, Parameter | Key]
+
+
+def read_keys(given: Any, keys: Keys, where: str) -> dict[str, Any]:
+    """Values of a section by key; None where one is left out that has no default.
+
+    Raises
+    ------
+    InputError
+        If `given` is no section, has an unknown key or a wrong value, or lacks a key that must be given.
+    """
+    section = section_of({where: given}, where, "")
+    check_keys(section, keys, where)
+    found: dict[str, Any] = {}
+    for name, key in keys.items():
+        path, value = f"{where}.{name}", section.get(name, key.default)
+        if name not in section and value is None:
+            if isinstance(key, Parameter) and not key.optional:
+                raise InputError(path, missing_text(name, key))
+            if isinstance(key, Key) and key.example:
+                raise InputError(path, f"missing: {key.long_name} (for example `{name}: {key.example}`)")
+        elif isinstance(key, Parameter):
+            number = quantity(value, key, path)
+            value = int(number) if key.whole else number
+        elif key.names is not None:
+            value = one_of(value, key.names, path, f"is no {key.long_name}")
+        elif isinstance(key.default, bool) and not isinstance(value, bool):
+            raise InputError(path, f"true or false is expected, got {show(value)}")
+        found[name] = value
+    return found
 
 
 def section_of(parent: dict[str, Any], key: str, prefix: str) -> dict[str, Any]:

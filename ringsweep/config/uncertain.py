@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ringsweep.config.axes import Axes, paths_of, read_spacing, swept_parameter
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.scene import outcome_numbers, sweepable
-from ringsweep.config.sections import boolean, check_keys, one_of, read_values, suggestion
+from ringsweep.config.sections import Key, Keys, one_of, read_keys, read_values, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
@@ -25,15 +25,18 @@ from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import NUMBER, is_plain, quantity, show
 from ringsweep.statistics import DISTRIBUTIONS, METHODS, distribution, saltelli, unit_points
 
-#: Keys of ``sweep.sample`` with a number.
-NUMBERS = {
+#: Keys of ``sweep.sample``.
+KEYS: Keys = {
     "n": Parameter("1", "number of samples of each cell", lower=2, upper=1_000_000, whole=True),
     "seed": Parameter("1", "seed of the sample", lower=0, upper=2**53, whole=True, default=0),
     "replicates": Parameter("1", "independent parts of the sample", lower=4, upper=64, whole=True, default=8),
+    "method": Key("method of drawing points", dict.fromkeys(METHODS, ""), METHODS[0]),
+    "of": Key("distributions by path", example="{body.mass: {normal: [76 g, 1 %]}}"),
+    "quantiles": Key("variable -> levels"),
+    "survival": Key("times at which it is asked whether the contacts still hold"),
+    "sensitivity": Key("Sobol indices, and of which variables beside the regimes"),
+    "keep": Key("whether the result holds the runs too", default=False),
 }
-
-#: Keys of ``sweep.sample``.
-KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity", "keep")
 
 # Mean and tolerance of a uniform distribution, as engineers write them.
 _TOLERANCE = re.compile(r"\s*(.+?)\s*(?:±|\+/?-)\s*(.+?)\s*")
@@ -201,29 +204,16 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     if given is None:
         return None
     where = "sweep.sample"
-    if not isinstance(given, dict):
-        raise InputError(where, f"a section with keys is expected, got {show(given)}")
-    check_keys(given, KEYS, where)
-    for key, example in (("n", "n: 1024"), ("of", "of: {body.mass: {normal: [76 g, 1 %]}}")):
-        if key not in given:
-            raise InputError(f"{where}.{key}", f"missing (for example `{example}`)")
-    numbers = {
-        key: int(quantity(given.get(key, parameter.default), parameter, f"{where}.{key}"))
-        for key, parameter in NUMBERS.items()
+    section = read_keys(given, KEYS, where)
+    _check_number(section["method"], section["n"], section["replicates"])
+    sensitivity, sensitive = _sensitivity(section["sensitivity"], scene, bool(section["survival"]))
+    own = {
+        "factors": _factors(section.pop("of"), scene, axes),
+        "quantiles": _quantiles(section["quantiles"], scene),
+        "survival": _survival(section["survival"], scene),
+        "sensitivity": sensitivity,
     }
-    method = one_of(given.get("method", METHODS[0]), METHODS, f"{where}.method", "is not a method")
-    _check_number(method, numbers["n"], numbers["replicates"])
-    sensitivity, sensitive = _sensitivity(given.get("sensitivity", False), scene, bool(given.get("survival")))
-    found = Sample(
-        _factors(given["of"], scene, axes),
-        method=method,
-        quantiles=_quantiles(given.get("quantiles"), scene),
-        survival=_survival(given.get("survival"), scene),
-        **numbers,
-        sensitivity=sensitivity,
-        sensitive=sensitive,
-        keep=boolean(given.get("keep", False), f"{where}.keep"),
-    )
+    found = Sample(**section | own, sensitive=sensitive)
     cells = math.prod(axes.sizes.values())
     for path, total in (("", cells * found.replicates), (".keep", cells * found.n * found.rows * found.keep)):
         if total > MAX_CELLS:
@@ -392,8 +382,8 @@ def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
 
 def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str, ...]]:
     """Whether Sobol indices are asked for, and of which variables beside the regimes."""
-    if isinstance(given, bool):
-        return given, ()
+    if given is None or isinstance(given, bool):
+        return bool(given), ()
     where = "sweep.sample.sensitivity"
     if not isinstance(given, dict) or set(given) != {"of"}:
         raise InputError(where, f"true, false, or {{of: [t_end]}} is expected, got {show(given)}")
