@@ -192,7 +192,7 @@ def without(scene, *sections):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"record": {"section": {"keep": 3}}}, "record.section.at: missing: instant of a section (for example `at: period`)"),
+        ({"record": {"section": {"keep": 3}}}, "record.section.at: missing: instant of a section"),
         ({"record": {"section": {"at": "periods"}}}, "record.section.at: 'periods' is no instant of a section"),
         ({"record": {"section": {"at": "turn", "kept": 3}}}, "record.section.kept: unknown key; did you mean `keep`?"),
         ({"record": {"section": {"at": "turn", "keep": 0}}}, "record.section.keep: 0 is not allowed"),
