@@ -10,7 +10,7 @@ import numpy as np
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit, modes, recorder, variation
 from ringsweep.numerics.clock import Instant, later
-from ringsweep.numerics.series import ORDER, ascending, crossings, first_root, value
+from ringsweep.numerics.series import ORDER, ascending, crossings, differentiate, first_root, value
 from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.steps import INSTANTS
@@ -21,10 +21,6 @@ _INTERPOLATION = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1
 
 # Factor by which the relative error of the acceleration on bristles may exceed the relative error of the state.
 _ACCELERATION_FACTOR = 100.0
-
-
-# Fraction of a step to which the instant of an extreme is found: the error of the extreme is the square of it.
-_EXTREME_PRECISION = 1e-8
 
 
 # Error of the dense output at an extreme, as a share of what the extreme exceeds the ends of the step by.
@@ -75,6 +71,13 @@ def start_at(scene, course, mode, now, y):
 def _view_at(scene, start, course, s, x):
     """View of a state the time `s` after the beginning of a step."""
     return implicit.guards_and_motion(scene, start.mode, start.common, implicit.forcing(scene, course, start.now, s), x)
+
+
+@inlined
+def _view_within(scene, start, scratch, taken, fraction):
+    """View of the dense output at a fraction of a step."""
+    x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
+    return _view_at(scene, start, scratch.course, fraction * taken.h, x)
 
 
 @inlined
@@ -184,12 +187,10 @@ def _first_event(scene, start, scratch, taken, views):
 
     `views` are those at the beginning, in the middle and at the end of the step.
     """
-    (before, within, after), samples, (s, x_next) = views, scratch.samples, taken
+    (before, within, after), samples, s = views, scratch.samples, taken.h
     near_zero = implicit.near_zero(scene, within[1])
     for i in range(1, INSTANTS, 2):
-        fraction = i / INSTANTS
-        state = rosenbrock.dense(start.x, x_next, scratch.bends[0], fraction)
-        guards = _view_at(scene, start, scratch.course, fraction * s, state)[0]
+        guards = _view_within(scene, start, scratch, taken, i / INSTANTS)[0]
         for g in range(len(near_zero)):
             samples[g, i] = guards[g]
     event, h_event = -1, s
@@ -212,6 +213,16 @@ def _first_event(scene, start, scratch, taken, views):
 
 
 @inlined
+def _interpolate(samples, row):
+    """Fill `row` with the series of the polynomial through the values of a quantity, in fractions of the step."""
+    for k in range(ORDER + 1):
+        row[k] = 0.0
+        if k <= INSTANTS:
+            for i in range(INSTANTS + 1):
+                row[k] += _INTERPOLATION[k, i] * samples[i]
+
+
+@inlined
 def _fraction_below_zero(samples, work):
     """Fraction of a step, soon after the first root of a guard, at which the guard is below zero; 0 if there is none.
 
@@ -224,11 +235,7 @@ def _fraction_below_zero(samples, work):
     if samples[0] <= 0.0:
         return end
     row = work[0]
-    for k in range(ORDER + 1):
-        row[k] = 0.0
-        if k <= INSTANTS:
-            for i in range(INSTANTS + 1):
-                row[k] += _INTERPOLATION[k, i] * samples[i]
+    _interpolate(samples, row)
     root, found = first_root(row, 1.0, work[1:])
     if not found or (end > 0.0 and root > end - 1.0 / INSTANTS):
         return end
@@ -335,7 +342,8 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             s = h = h * (max(0.2, 0.9 * h_norm**-0.2) if isfinite(h_norm) else 0.1)
             event = -1
             continue
-        middle = _view_at(scene, start, course, 0.5 * h, rosenbrock.dense(x, x_next, bends, 0.5))
+        taken = Taken(h, x_next)
+        middle = _view_within(scene, start, scratch, taken, 0.5)
         after = implicit.guards_and_motion(scene, mode, common, end, x_next)
         if event >= 0:
             break
@@ -344,7 +352,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])
         if not near:
             break
-        event, h = _first_event(scene, start, scratch, Taken(s, x_next), (before, middle, after))
+        event, h = _first_event(scene, start, scratch, taken, (before, middle, after))
         if event < 0 or h == 0.0:
             break
         near = False
@@ -356,14 +364,9 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         event += scratch.first_guard
         if h == 0.0:
             return event, 0.0, y, record, control, 0.0
-    taken, fractions, count = Taken(h, x_next), scratch.work[0], 0
+    fractions = scratch.work[0]
     record = recorder.enter(scene, record, now.t, implicit.seen(scene, before))
-    # Where the velocity changes sign the place has an extreme: the recorder must look there.
-    for begin, ends in ((0.0, (before[1][1], middle[1][1])), (0.5, (middle[1][1], after[1][1]))):
-        if ends[0] * ends[1] < 0.0:
-            fractions[count] = _sign_change(scene, start, scratch, taken, begin, ends)
-            count += 1
-    count = _extremes(scene, record, start, scratch, taken, (before, middle, after), count)
+    count = _extremes(scene, record, start, scratch, taken, (before, middle, after))
     for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
         fractions[count] = i / INSTANTS
         count += 1
@@ -378,7 +381,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         fraction = fractions[j]
         view = after if fraction == 1.0 else middle
         if fraction != 0.5 and fraction != 1.0:
-            view = _view_at(scene, start, course, fraction * h, rosenbrock.dense(x, x_next, bends, fraction))
+            view = _view_within(scene, start, scratch, taken, fraction)
         if fraction != 1.0 and _sets_record(scene, record, (before, view, after)):
             # A step of the method is more exact than the dense output, whose error may be that of the whole step.
             there = implicit.forcing(scene, course, now, fraction * h)
@@ -395,33 +398,59 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
 
 
 @inlined
-def _extremes(scene, record, start, scratch, taken, views, count):
-    """Append to ``work[0]`` the fractions of a step at which the velocity turns or a force may set a record.
+def _may_turn(first, middle, last):
+    """Whether a quantity may have an extreme within a step that sets a record.
+
+    The arguments are what :func:`implicit.sought` returned for it at the beginning, in the middle and at the end.
+    """
+    (a, least, greatest), b, c = first, middle[0], last[0]
+    bend = abs(a - 2.0 * b + c)
+    # The parabola through the three values is monotonic if their difference is twice as large as its bend.
+    turns = abs(c - a) < 4.0 * bend
+    return turns and (max(a, max(b, c)) + 0.5 * bend > greatest or min(a, min(b, c)) - 0.5 * bend < least)
+
+
+@inlined
+def _extremes(scene, record, start, scratch, taken, views):
+    """Store in ``work[0]`` the fractions of a step at which place, velocity or a force may set a record.
 
     A quantity is taken as the polynomial through its values at five instants. Its value at an extreme does not depend
     on small errors of the instant. The acceleration would tell the instant worse: where friction rises steeply, it
     magnifies the error of the dense output.
 
-    `views` are those at the beginning, in the middle and at the end of the step; `count` is the number of fractions
-    before. The new number is returned.
+    `views` are those at the beginning, in the middle and at the end of the step. The number of fractions is returned.
     """
-    found = False
+    work, row, count = scratch.work[:-1], scratch.work[-1], 0
+    before, within, after = views[0][1], views[1][1], views[2][1]
+    # The recorder must look where the place turns. Velocities count beside their records: between two turns of the
+    # velocity a body may reverse.
+    reverses = before[1] * within[1] < 0.0 or within[1] * after[1] < 0.0
+    turns = before[2] * within[2] < 0.0 or within[2] * after[2] < 0.0
     first, middle, last = (
         implicit.sought(scene, record, views[0]),
         implicit.sought(scene, record, views[1]),
         implicit.sought(scene, record, views[2]),
     )
+    found = reverses or turns
     for q in range(1, len(first)):
-        (a, least, greatest), b, c = first[q], middle[q][0], last[q][0]
-        bend = abs(a - 2.0 * b + c)
-        # The parabola through the three values is monotonic if their difference is twice as large as its bend.
-        turns = abs(c - a) < 4.0 * bend
-        beyond = max(a, max(b, c)) + 0.5 * bend > greatest or min(a, min(b, c)) - 0.5 * bend < least
-        found = found or (turns and beyond)
-    # Velocities count beside their records: between two turns of the velocity a body may reverse.
-    before, within, after = views[0][1][2], views[1][1][2], views[2][1][2]
-    found = found or before * within < 0.0 or within * after < 0.0
-    return _turns(scene, record, start, scratch, taken, views, count) if found else count
+        found = found or _may_turn(first[q], middle[q], last[q])
+    if not found:
+        return 0
+    early = implicit.sought(scene, record, _view_within(scene, start, scratch, taken, 0.25))
+    late = implicit.sought(scene, record, _view_within(scene, start, scratch, taken, 0.75))
+    for q in range(1, len(first)):
+        may_turn = _may_turn(first[q], early[q], middle[q]) or _may_turn(middle[q], late[q], last[q])
+        if q == 1:
+            may_turn = may_turn or turns
+        if not (may_turn or (q == 1 and reverses)):
+            continue
+        _interpolate((first[q][0], early[q][0], middle[q][0], late[q][0], last[q][0]), row)
+        if q == 1 and reverses:
+            count = crossings(row, 1.0, work, count)
+        if may_turn:
+            differentiate(row, row)
+            count = crossings(row, 1.0, work, count)
+    return count
 
 
 @inlined
@@ -441,57 +470,4 @@ def _sets_record(scene, record, views):
         above, below = value - max(a, b), min(a, b) - value
         found = found or (above > 0.0 and value + _DENSE_ERROR * above > greatest)
         found = found or (below > 0.0 and value - _DENSE_ERROR * below < least)
-    return found
-
-
-@inlined
-def _turns(scene, record, start, scratch, taken, views, count):
-    """Append to ``work[0]`` the fractions of a step at which quantities turn; see :func:`_extremes`."""
-    samples, work, row, quantities = scratch.samples, scratch.work[:-1], scratch.work[-1], 0
-    for i in range(INSTANTS + 1):
-        fraction = i / INSTANTS
-        view = views[i // 2]
-        if i % 2 == 1:
-            x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
-            view = _view_at(scene, start, scratch.course, fraction * taken.h, x)
-        sought = implicit.sought(scene, record, view)
-        quantities = len(sought)
-        for q in range(quantities):
-            samples[q, i] = sought[q][0]
-    for q in range(1, quantities):
-        for k in range(ORDER + 1):
-            row[k] = 0.0
-            if k < INSTANTS:
-                for i in range(INSTANTS + 1):
-                    row[k] += (k + 1.0) * _INTERPOLATION[k + 1, i] * samples[q, i]
-        count = crossings(row, 1.0, work, count)
-    return count
-
-
-@inlined
-def _sign_change(scene, start, scratch, taken, begin, ends):
-    """Fraction of a step at which the velocity of the body changes sign.
-
-    The sign changes in the half step that begins at the fraction `begin`; `ends` are the velocities at both ends of the
-    half step.
-    """
-    (first, last), low, high = ends, begin, begin + 0.5
-    found, side = low, 0
-    for _ in range(60):
-        before, found = found, (low * last - high * first) / (last - first)
-        if not low < found < high:
-            found = 0.5 * (low + high)
-        if abs(found - before) <= _EXTREME_PRECISION:
-            break
-        state = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], found)
-        there = _view_at(scene, start, scratch.course, found * taken.h, state)[1][1]
-        # Illinois algorithm: an end of the bracket that stays twice loses half its value.
-        if there * first > 0.0:
-            low, first = found, there
-            last *= 0.5 if side == 1 else 1.0
-            side = 1
-        else:
-            high, last = found, there
-            first *= 0.5 if side == -1 else 1.0
-            side = -1
     return found
