@@ -562,6 +562,28 @@ def test_documentation_names_every_key_law_drive_and_variable():
         assert re.search(rf"`[^`]*\b{re.escape(name)}`", text), name
 
 
+def test_json_of_run_and_info_has_the_counts_and_nothing_else_on_stdout(folder, capsys):
+    assert main(["run", "case.yaml", "--json", "--jobs", "1"]) == 0
+    out, err = capsys.readouterr()
+    assert "wrote case.nc" in err
+    found = json.loads(out)
+    assert sum(found["counts"]["regime"].values()) == 5
+    assert found["dimensions"] == {"drive_amplitude": 5}
+    assert main(["info", "case.nc", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == found
+
+
+def test_simulate_takes_a_cell_of_a_file(folder, capsys):
+    assert main(["run", "case.yaml", "--jobs", "1"]) == 0
+    assert main(["simulate", "case.nc", "--sel", "drive.amplitude=1", "--set", "time.span=1"]) == 0
+    run, cells = netcdf.load("case-run.nc"), netcdf.load("case.nc")
+    scene = json.loads(run.attrs["configuration"])["scene"]
+    assert scene["drive"]["amplitude"] == cells.drive_amplitude[2]
+    assert scene["time"]["span"] == 1
+    capsys.readouterr()
+    assert "names a cell of a result file" in refused(capsys, "simulate", "case.yaml", "--sel", "drive.amplitude=1")
+
+
 def test_info_tells_what_follows_lost_contacts_and_the_greatest_loads(tmp_path, capsys):
     values = {"regime": [1, 3, 3, 3], "aftermath": [0, 1, 1, 3], "gap_max": [0.0, 1e-5, 2e-3, 0.0168]}
     values |= {"separations": [0, 3, 1, 5], "impacts": [0, 59, 4, 100]}
@@ -570,7 +592,7 @@ def test_info_tells_what_follows_lost_contacts_and_the_greatest_loads(tmp_path, 
         {name: ("drive_amplitude", np.array(column), OUTCOMES[name].attributes) for name, column in values.items()},
         {"drive_amplitude": [1.0, 2.0, 3.0, 4.0]},
     )
-    report.summarise(ds)
+    print(report.in_lines(ds))
     text = capsys.readouterr().out
     assert "contacts:\n  held: 1 (25.0%)\n  recovered: 2 (50.0%)\n  tumbled: 1 (25.0%)\n" in text
     counts = "losses of contact 1 to 5, median 3; impacts 4 to 100, median 59"

@@ -59,6 +59,23 @@ def both():
     return branches().load()
 
 
+@pytest.mark.parametrize(("way", "frequency", "begun"), [("up", 0.21, 0), ("up", 0.33, 1), ("down", 0.24, 1)])
+def test_history_of_a_followed_cell_begins_where_the_cell_before_ended(both, way, frequency, begun):
+    cell = {"force.amplitude": 0.5, "force.frequency": frequency, "direction": way}
+    history = both.ringsweep.simulate(cell)
+    here = both.sel(force_amplitude=0.5, direction=way)
+    before = here.sel(force_frequency=frequency + (-0.03 if way == "up" else 0.03), method="nearest")
+    here = here.sel(force_frequency=frequency)
+    assert history.x[0] == (before.x_end if begun else 0.0)
+    for name in ("t_end", "x_end", "velocity_end", "regime"):
+        assert history[name].item() == here[name].item()
+
+
+def test_cell_of_a_part_of_a_followed_sweep_is_refused(both):
+    with pytest.raises(InputError, match="is a part of a sweep that follows an axis"):
+        both.isel(force_frequency=[2, 3]).ringsweep.simulate(force_frequency=0.3, force_amplitude=0.5, direction="up")
+
+
 def test_swing_of_a_followed_cell_is_that_of_a_run_from_the_same_state():
     """Where the span is a whole number of periods but for rounding, its last period counts."""
     frequencies = np.linspace(0.2, 0.36, 24)
@@ -290,11 +307,6 @@ class TestFilesThatDoNotGoOn:
             file(one, scene=changed(LUGRE, "initial", **{"from": str(tmp_path / other)}))
         self.refused(tmp_path / "a.nc", "a result holds its initial values")
         assert cli.main(["run", str(tmp_path / "a.nc"), "--dry-run"]) == 2
-
-
-def test_a_cell_of_a_chain_has_no_configuration_of_its_own(both):
-    with pytest.raises(InputError, match="end of the one before"):
-        ringsweep.plots.cell(both.isel(force_amplitude=0, force_frequency=1, direction=0))
 
 
 class TestSweepsInPython:

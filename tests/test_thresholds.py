@@ -9,6 +9,7 @@ import xarray as xr
 import ringsweep
 from ringsweep import cli
 from ringsweep.runs.thresholds import in_words
+from ringsweep.storage import netcdf
 
 BELT = {
     "model": "belt",
@@ -92,10 +93,27 @@ class TestThreshold:
             assert f"riding begins at body.mass = {mass}" in said
             assert f"scan: 5 runs from {ends}" in said
         assert cli.main([*asked, "--unit", "rpm"]) == 2
-        assert "is in kg" in capsys.readouterr().err
+        assert "unit: 'rpm' does not fit: body.mass is in kg" in capsys.readouterr().err
         assert cli.main(["run", str(config), "-o", str(tmp_path / "belt.nc")]) == 0
         assert cli.main(["info", str(tmp_path / "belt.nc")]) == 0
         assert "body_mass: 1000 to 2000 g" in capsys.readouterr().out
+
+    def test_thresholds_are_written_and_printed_as_json(self, tmp_path, capsys):
+        config, output = tmp_path / "belt.yaml", str(tmp_path / "edge.nc")
+        config.write_text(json.dumps({"scene": BELT, "sweep": {"grid": {"body.mass": ["1000 g", "2000 g"]}}}))
+        asked = ["threshold", str(config), "--path", "body.mass", "--regime", "riding", "--scan", "5", "-o", output]
+        for _ in range(2):
+            assert cli.main([*asked, "--json"]) == 0
+        found = json.loads(capsys.readouterr().out.partition("}\n{")[0] + "}")
+        (one,) = found["thresholds"]
+        assert (one["does"], one["beyond"], found["unit"]) == ("begins", "stick-slip", "g")
+        assert abs(one["value"] - 1359.157) < 0.01 >= one["error"]
+        assert cli.main(["info", output]) == 0
+        assert "riding begins at body.mass = 1359.15" in capsys.readouterr().out
+        assert cli.main(["info", output, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["thresholds"] == [one]
+        with netcdf.open_dataset(output) as written:
+            assert written.body_mass.item() == pytest.approx(1e-3 * one["value"])
 
     def test_interval_without_a_change_has_no_threshold(self, tmp_path, capsys):
         config = tmp_path / "belt.yaml"

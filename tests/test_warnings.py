@@ -13,7 +13,7 @@ import xarray as xr
 import yaml
 
 import ringsweep
-from ringsweep.cli.report import summarise
+from ringsweep.cli.report import in_lines
 from ringsweep.config import load
 from ringsweep.quantities.flags import FAILED, OSCILLATORY
 from ringsweep.runs import cells
@@ -127,7 +127,7 @@ def test_belts_give_the_share_of_motions_that_have_not_settled(caplog, capsys):
     of = BELT | {"body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}, "initial": {"x": 0.0}}
     found = ringsweep.sweep(of, {"time.span": [12.0, 60.0]}, progress=False)
     assert "50.0% of the motions have not settled" in caplog.text
-    summarise(found)
+    print(in_lines(found))
     assert "not settled: 50.0% of the motions" in capsys.readouterr().out
 
 
@@ -244,7 +244,7 @@ def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
     netcdf.save(ds, tmp_path / "out.nc")
     with netcdf.open_dataset(tmp_path / "out.nc") as found:
         tracemalloc.start()
-        summarise(found)
+        print(in_lines(found))
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
     out = capsys.readouterr().out

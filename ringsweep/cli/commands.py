@@ -7,9 +7,11 @@ quickly.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import logging
+import sys
 from collections.abc import Callable, Iterable
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +78,7 @@ def run_command(arguments: argparse.Namespace) -> int:
         print(describe(config, target, arguments.jobs, arguments.reuse))
         return 0
 
-    from ringsweep.cli.report import status_of, summarise
+    from ringsweep.cli.report import as_json, in_lines, status_of
     from ringsweep.runs.executors import Execution
     from ringsweep.runs.sweep import write
     from ringsweep.storage import netcdf
@@ -84,17 +86,20 @@ def run_command(arguments: argparse.Namespace) -> int:
     if arguments.scheduler is not None and not arguments.verbose:
         _silence_dask()
     execution = Execution(arguments.jobs, arguments.scheduler, not arguments.quiet)
-    if computed := write(config, target, execution, fresh=arguments.fresh, reuse=arguments.reuse):
-        print(f"wrote {target}")
-    else:
-        print(f"{target} holds this sweep already (--fresh computes it again)")
-    with netcdf.reading(target) as result:
-        summarise(result)
-        status = status_of(result)
-        if not computed and picture.exists() and picture.stat().st_mtime >= target.stat().st_mtime:
-            return status
-        if config.axes.sizes or config.sample is not None:
-            _draw(lambda: ringsweep.plots.regime_map(result), picture, f"ringsweep map {target}")
+    out = sys.stdout
+    # Whoever reads JSON wants nothing else.
+    with redirect_stdout(sys.stderr if arguments.json else out):
+        if computed := write(config, target, execution, fresh=arguments.fresh, reuse=arguments.reuse):
+            print(f"wrote {target}")
+        else:
+            print(f"{target} holds this sweep already (--fresh computes it again)")
+        with netcdf.reading(target) as result:
+            print(as_json(result) if arguments.json else in_lines(result), file=out)
+            status = status_of(result)
+            if not computed and picture.exists() and picture.stat().st_mtime >= target.stat().st_mtime:
+                return status
+            if config.axes.sizes or config.sample is not None:
+                _draw(lambda: ringsweep.plots.regime_map(result), picture, f"ringsweep map {target}")
     return status
 
 
@@ -183,11 +188,10 @@ def simulate_command(arguments: argparse.Namespace) -> int:
 
     ringsweep simulate my.yaml         my-run.nc and my-run.png
     ringsweep simulate my.yaml --set drive.amplitude=4 --set "zone.half_angle=20 deg"
+    ringsweep simulate my.nc --sel drive.amplitude=4     the cell of my.nc at or beside this amplitude
     ringsweep simulate my.nc --set drive.amplitude=4     the scene of my.nc, with this amplitude
     """
-    from ringsweep.config import with_values
-
-    config = with_values(arguments.config, arguments.set)
+    config = _single_run(arguments)
     inputs = arguments.config, config.begins_from
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history", inputs)
 
@@ -201,18 +205,46 @@ def simulate_command(arguments: argparse.Namespace) -> int:
     return status_of(result)
 
 
+def _single_run(arguments: argparse.Namespace) -> Any:
+    """Configuration of the run of a scene, or of a cell of a file, with the values that are set."""
+    from ringsweep.config import with_values
+
+    if not arguments.sel:
+        return with_values(arguments.config, arguments.set)
+    from ringsweep.cli.drawing import selection_of
+    from ringsweep.config.yaml_text import is_result
+    from ringsweep.storage import netcdf
+
+    if not is_result(Path(arguments.config)):
+        raise InputError("--sel", f"names a cell of a result file, and {arguments.config} is none: --set PATH=VALUE")
+    with netcdf.reading(arguments.config) as result:
+        cell = ringsweep.plots.cell(result, dict(map(selection_of, arguments.sel)))
+    return dataclasses.replace(with_values(cell, arguments.set), name=Path(arguments.config).stem)
+
+
 def threshold_command(arguments: argparse.Namespace) -> None:
     """The value of a number at which a regime begins or ends.
 
     ringsweep threshold my.yaml --path drive.amplitude --regime separating
     ringsweep threshold my.yaml --path zone.half_angle --regime jammed --from "2 deg" --to "60 deg"
     ringsweep threshold my.yaml --path friction.rough.mu_k --regime separating --from 0.1 --to 0.5 --tolerance 1e-9
+    ringsweep threshold my.yaml --path drive.amplitude --regime separating --unit rpm --json -o edge.nc
     """
+    from ringsweep.cli.report import as_json
+    from ringsweep.config import load
     from ringsweep.runs.thresholds import in_words, threshold
+    from ringsweep.storage import netcdf
 
+    if arguments.output is not None:
+        mark = "vertex" if load(arguments.config).sample is None else "threshold"
+        _outputs(arguments.output, mark, "threshold", [arguments.config])
     asked = arguments.config, arguments.path, arguments.regime, (arguments.low, arguments.high), arguments.tolerance
     options = {"set": arguments.set, "scan": arguments.scan, "jobs": arguments.jobs, "unit": arguments.unit}
-    print(in_words(threshold(*asked, **options)))
+    found = threshold(*asked, **options)
+    print(as_json(found) if arguments.json else in_words(found))
+    if arguments.output is not None:
+        netcdf.save(found, arguments.output)
+        logger.info("wrote %s", arguments.output)
 
 
 def fit_command(arguments: argparse.Namespace) -> None:
@@ -253,10 +285,9 @@ def animate_command(arguments: argparse.Namespace) -> int:
     ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
     ringsweep animate my.nc -o run.html  a page with buttons, for the scene of my.nc
     """
-    from ringsweep.config import with_values
     from ringsweep.models import MODELS
 
-    config = with_values(arguments.config, arguments.set)
+    config = _single_run(arguments)
     target = arguments.output or f"{config.name}-run.gif"
     model = config.scene.structure.model
     if not MODELS[model].driven:
@@ -308,6 +339,11 @@ def info_command(arguments: argparse.Namespace) -> None:
     with netcdf.reading(arguments.dataset) as result:
         if arguments.cite:
             print(result.attrs["references"])
+            return
+        if arguments.json:
+            from ringsweep.cli.report import as_json
+
+            print(as_json(result))
             return
         _print_summary(arguments.dataset, result)
     print("seal:", "the file is what ringsweep wrote" if sealed else "none, so damage would not be noticed")
@@ -362,9 +398,9 @@ def _print_summary(name: str, result: Any) -> None:
     elif "fit_report" in result.attrs:
         print(result.attrs["fit_report"])
     else:
-        from ringsweep.cli.report import summarise
+        from ringsweep.cli.report import in_lines
 
-        summarise(result)
+        print(in_lines(result))
     print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))
     print("versions:", result.attrs["ringsweep_version"], result.attrs.get("versions", ""))
 

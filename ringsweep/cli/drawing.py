@@ -33,7 +33,7 @@ def draw_stored(arguments: argparse.Namespace, draw: Callable[[argparse.Namespac
 
 def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     """Draw a variable of a sweep: as a map, a bifurcation diagram, a circle of multipliers, or a page."""
-    selection = dict(_selection(text) for text in arguments.sel)
+    selection = dict(map(selection_of, arguments.sel))
     fixed = {name.replace(".", "_") for name in selection}
     plain = not (arguments.y or arguments.log or arguments.boundaries or str(arguments.output).endswith(".html"))
     kind, var = suitable(result, arguments.var, selection, plain)
@@ -127,7 +127,7 @@ def draw_plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     elif mark == "contender":
         save(plots.work_precision(result), target)
     elif mark == "probability":
-        selection = dict(_selection(text) for text in arguments.sel)
+        selection = dict(map(selection_of, arguments.sel))
         if kind in (None, "probability"):
             save(plots.regime_map(result, sel=selection), target)
         else:
@@ -173,7 +173,7 @@ def panel(draw: Callable[..., Any], result: Any, height: float = 4.2, **options:
     return figure
 
 
-def _selection(text: str) -> tuple[str, str]:
+def selection_of(text: str) -> tuple[str, str]:
     """Coordinate and value of ``DIM=VALUE``."""
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:

@@ -43,6 +43,7 @@ def build_parser() -> argparse.ArgumentParser:
     _option(run, "--fresh", "start over: discard what an earlier run computed")
     _option(run, "--reuse OLD.nc", "take cells that this earlier sweep has too")
     _option(run, "--refine", "compute only the boundaries, audit the rest (see sweep.refine)")
+    _option(run, *_JSON)
     _option(run, "--backend", "what computes (default: threads of this machine)", choices=["threads", "dask"])
     _option(run, "--scheduler ADDRESS", "address of a Dask scheduler, such as tcp://host:8786")
 
@@ -68,6 +69,8 @@ def build_parser() -> argparse.ArgumentParser:
     _option(threshold, "--tolerance T", "largest error (default: 1e-6 of the greatest value)")
     _option(threshold, "--unit U", "unit of the answer: rpm (default: as the ends or the file have it)")
     _option(threshold, "--scan N", "runs in which changes of regime are looked for (default: 128)", type=_COUNT)
+    _option(threshold, "-o --output OUT.nc", "write the thresholds too (default: only print them)")
+    _option(threshold, *_JSON)
     _option(threshold, *_JOBS, type=_COUNT)
     _option(threshold, *_SET, **_LIST)
 
@@ -82,6 +85,7 @@ def build_parser() -> argparse.ArgumentParser:
     simulate = _add_command(entries, commands.simulate_command, "config CONFIG.yaml", "or OUT.nc, whose scene is run")
     _option(simulate, "-o --output RUN.nc", "default: the configuration's name with -run")
     _option(simulate, *_SET, **_LIST)
+    _option(simulate, *_SEL, **_LIST)
 
     stored = "what ringsweep simulate or precision wrote, or a sampled sweep"
     plot = _add_command(entries, commands.plot_command, "dataset RUN.nc", stored)
@@ -98,6 +102,7 @@ def build_parser() -> argparse.ArgumentParser:
     animate = _add_command(entries, commands.animate_command, "config CONFIG.yaml", "or OUT.nc, whose scene is run")
     _option(animate, "-o --output RUN.gif", "default: the configuration's name with -run; .mp4 and .html too")
     _option(animate, *_SET, **_LIST)
+    _option(animate, *_SEL, **_LIST)
 
     taken = "or OUT.nc, whose sweep is taken"
     precision = _add_command(entries, commands.precision_command, "config CONFIG.yaml", taken)
@@ -108,6 +113,7 @@ def build_parser() -> argparse.ArgumentParser:
     _option(precision, "--rounds N", "timings of each setting (default: 3)", type=_COUNT)
 
     info = _add_command(entries, commands.info_command, "dataset OUT.nc")
+    _option(info, *_JSON)
     _option(info, "--cite", "print only what a paper that uses it can cite")
 
     _add_command(entries, commands.verify_command, "files FILE.nc", nargs="+")
@@ -182,6 +188,8 @@ def _formatter(prog: str) -> argparse.HelpFormatter:
 
 # Options that several commands have.
 _SET = "--set PATH=VALUE", "change a value: drive.amplitude=3"
+_SEL = "--sel DIM=VALUE", "run the cell of OUT.nc nearest to VALUE; units allowed"
+_JSON = "--json", "print JSON in place of text"
 _JOBS = "--jobs N", "threads (default: all cores)"
 
 # Of an option that may be repeated.

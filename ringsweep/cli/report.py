@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import re
 from itertools import chain
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from ringsweep.quantities.flags import CERTIFIED, FAILED, JAMMED, REGIMES, RIDING, SEPARATING
-from ringsweep.quantities.variables import DOUBTS, INFERRED, meanings_of, words
+from ringsweep.quantities.variables import DOUBTS, INFERRED, is_classification, meanings_of, words
 from ringsweep.storage.chunks import parts
 
 
@@ -19,9 +22,24 @@ def status_of(result: xr.Dataset) -> int:
     return int((result["regime"] == FAILED).all())
 
 
-def summarise(result: xr.Dataset) -> None:
-    """Print the summary of a result."""
-    print(*chain(*summary(result).values()), sep="\n")
+def in_lines(result: xr.Dataset) -> str:
+    """The summary of a result as text."""
+    return "\n".join(chain(*summary(result).values()))
+
+
+def as_json(result: xr.Dataset) -> str:
+    """What a result says, as JSON: its lines by what they are about, and the cells of each class, or thresholds."""
+    found: dict[str, Any] = {"title": result.attrs.get("title"), "dimensions": dict(result.sizes)}
+    found["summary"] = {topic: [line.strip() for line in lines] for topic, lines in summary(result).items()}
+    if "threshold_path" in result.attrs:
+        from ringsweep.runs.thresholds import plain
+
+        found |= plain(result)
+    else:
+        flagged = [str(name) for name, data in result.data_vars.items() if is_classification(data)]
+        found["counts"] = {name: {word: count for _, word, count in _counts(result, name)} for name in flagged}
+    # JSON has no infinity.
+    return re.sub(r"(?<=: )-?Infinity|(?<=: )NaN", "null", json.dumps(found, indent=2, ensure_ascii=False))
 
 
 def summary(result: xr.Dataset) -> dict[str, list[str]]:
@@ -32,6 +50,10 @@ def summary(result: xr.Dataset) -> dict[str, list[str]]:
     why others are not, and the bounds on errors. Of the curves of a boundary, ``"boundary"`` has their number and the
     largest distance of the boundary from them.
     """
+    if "threshold_path" in result.attrs:
+        from ringsweep.runs.thresholds import in_words
+
+        return {"thresholds": in_words(result).splitlines()}
     if "vertex" in result.dims:
         curves, points = len(np.unique(result["line"])), result.sizes["vertex"]
         within = f", each within {result['error'].values.max():.2g} along its axis" if points else ""

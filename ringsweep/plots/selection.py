@@ -33,7 +33,8 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
     Returns
     -------
     dict
-        The configuration of the sweep with the values of the cell, and nothing swept.
+        The configuration of the sweep with the values of the cell, and nothing swept. A cell of a sweep that follows
+        an axis has the state in which it started as initial values.
 
     Raises
     ------
@@ -50,17 +51,23 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
     {'law': 'arctan', 'amplitude': 2.0}
     """
     # Models are slow to import, and a map, which uses `select`, needs none.
-    from ringsweep.config import with_values
+    from ringsweep.config import load, with_values
 
-    ds, _ = select(ds.drop_dims("section", errors="ignore"), sel or {})
-    if configuration_of(ds).get("sweep", {}).get("follow"):
-        starts = "a cell starts from the end of the one before, not from its configuration"
-        raise InputError("ds", f"follows an axis: {starts}")
-    if ds.sizes:
-        left = ", ".join(f"{dim} ({size})" for dim, size in ds.sizes.items())
+    whole, given = ds.drop_dims("section", errors="ignore"), configuration_of(ds)
+    numbered = whole.assign({f"index of {dim}": (dim, np.arange(size)) for dim, size in whole.sizes.items()})
+    one, _ = select(numbered, sel or {})
+    if one.sizes:
+        left = ", ".join(f"{dim} ({size})" for dim, size in one.sizes.items())
         raise InputError("sel", f"one cell is wanted, but {left} is left: hold it too")
-    settings = [(coordinate.attrs["path"], coordinate.item()) for coordinate in swept(ds)]
-    return with_values(configuration_of(ds), settings).source
+    settings = {coordinate.attrs["path"]: coordinate.item() for coordinate in swept(one)}
+    if given.get("sweep", {}).get("follow"):
+        from ringsweep.runs.cells import start_of
+
+        config = load(given)
+        if any(whole.sizes.get(dim) != size for dim, size in config.axes.sizes.items()):
+            raise InputError("ds", "is a part of a sweep that follows an axis, but a cell starts from those before it")
+        settings |= start_of(whole, config, {dim: int(one[f"index of {dim}"]) for dim in config.axes.sizes})
+    return with_values(given, settings.items()).source
 
 
 def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, list[str]]:

@@ -14,11 +14,12 @@ from time import monotonic, perf_counter, sleep
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Axes, Config, sweepable
-from ringsweep.config.axes import Indices, by_law, dimension, values_at
+from ringsweep.config.axes import Indices, by_law, dimension, laws_at, values_at
 from ringsweep.config.follow import DIRECTION
 from ringsweep.models import batch, model_of
 from ringsweep.models.model import Continues
@@ -127,19 +128,43 @@ def _runs(
     if config.follow is None:
         yield own, _outcomes(config, structure, values)
         return
-    model, before = model_of(structure), dict[str, NDArray[Any]]()
-    assert isinstance(model, Continues)
+    before = dict[str, NDArray[Any]]()
     for cells in in_chains(config, {dim: along[own] for dim, along in indices.items()}):
-        now = {path: column[cells] for path, column in values.items()}
-        held = np.zeros(len(cells), dtype=bool)
-        if before:
-            held = (before["regime"] == before["motion"]) & (before["motion"] != FAILED)
-            for path, column in model.continued(structure, now, before).items():
-                now[path] = np.where(held, column, now.get(path, _default(structure, path, now)))
-        now["time.span"] = _whole_periods(structure, now)
+        now, held = _started(structure, {path: column[cells] for path, column in values.items()}, before)
         found = _outcomes(config, structure, now)
         yield own[cells], found | {"started_from": held.astype(np.int8)}
         before = now | found
+
+
+def _started(
+    structure: Structure, now: dict[str, NDArray[np.float64]], before: Mapping[str, NDArray[Any]]
+) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_]]:
+    """Values of cells that start where those before them ended, and whether they do: not after runs without an end."""
+    model, held = model_of(structure), np.zeros(len(now["time.span"]), dtype=bool)
+    assert isinstance(model, Continues)
+    if before:
+        held = (before["regime"] == before["motion"]) & (before["motion"] != FAILED)
+        for path, column in model.continued(structure, now, before).items():
+            now[path] = np.where(held, column, now.get(path, _default(structure, path, now)))
+    return now | {"time.span": _whole_periods(structure, now)}, held
+
+
+def start_of(ds: xr.Dataset, config: Config, cell: Mapping[str, int]) -> dict[str, float]:
+    """Values of a cell of a sweep that follows an axis, by path, where they differ from those of the scene.
+
+    The cells before it end as the dataset says. `cell` is its index along each dimension.
+    """
+    assert config.follow is not None
+    dim, orders = config.follow.chains(config.axes)
+    order = orders[cell.get(DIRECTION, 0)].tolist()
+    now, before = dict[str, NDArray[np.float64]](), dict[str, NDArray[Any]]()
+    for k in order[: order.index(cell[dim]) + 1]:
+        here = {name: np.array([place]) for name, place in {**cell, dim: k}.items()}
+        structure = config.scene.structures[str(laws_at(config.scene, config.axes, here, 1)[0])]
+        now, _ = _started(structure, values_at(config.scene, config.axes, here, 1), before)
+        ended = ds.drop_dims("section", errors="ignore").isel({**cell, dim: k})
+        before = now | {str(name): np.atleast_1d(number.values) for name, number in ended.items()}
+    return {path: one.item() for path, one in now.items() if one.item() != config.scene.values.get(path)}
 
 
 def _default(structure: Structure, path: str, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:

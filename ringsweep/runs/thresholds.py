@@ -122,7 +122,11 @@ def threshold(
         given = (str(spelled(end)) for end in (() if between is None else between) if end is not None)
         unit = common_unit(given) or written_unit(whole.source, path)
     else:
-        quantity(f"1 {unit}", Parameter(sweepable(whole.scene)[path].attributes["units"], path), "unit")
+        si = sweepable(whole.scene)[path].attributes["units"]
+        try:
+            quantity(f"1 {unit}", Parameter(si, path), "unit")
+        except InputError:
+            raise InputError("unit", f"{unit!r} does not fit: {path} is in {si}") from None
     values, allowed = _scan(whole, path, ends, tolerance, scan)
     if whole.sample is not None:
         found = distribution(whole, path, regime, values, allowed, jobs=jobs)
@@ -299,18 +303,10 @@ def _scanned(runs: xr.Dataset, axis: xr.DataArray, label: str) -> str:
     """What a scan found, in words."""
     regimes = words(runs[label]).values
     seen = ", ".join(f"{count} {regime}" for regime, count in zip(*np.unique(regimes, return_counts=True), strict=True))
-    text = f"{len(regimes)} runs from {_number(axis[0].item(), axis)} to {_number(axis[-1].item(), axis)}: {seen}"
+    ends = " to ".join(f"{end:.6g}{after_number(axis.attrs.get('units', '1'))}" for end in axis.values[[0, -1]])
+    text = f"{len(regimes)} runs from {ends}: {seen}"
     unsure = int((runs["certified"] != 1).sum())
     return text + (f"; {unsure} not certified" if unsure else "")
-
-
-def _number(value: float, axis: xr.DataArray) -> str:
-    """A number with its unit."""
-    return f"{value:.6g}{_unit(axis)}"
-
-
-def _unit(data: xr.DataArray) -> str:
-    return after_number(data.attrs.get("units", "1"))
 
 
 def _with_error(value: float, error: float) -> str:
@@ -319,39 +315,52 @@ def _with_error(value: float, error: float) -> str:
     return f"{value:.{digits}f} ± {error:.1e}"
 
 
+def plain(found: xr.Dataset) -> dict[str, Any]:
+    """What :func:`threshold` found, as plain numbers in the unit of the answer."""
+    path, unit = found.attrs["threshold_path"], found.attrs.get("threshold_unit", "")
+    if "quantile" in found.dims:
+        si = found["threshold"].attrs.get("units", "1")
+        columns = {"value": found["threshold_quantile"]}
+        columns |= {end: found[f"threshold_quantile_{end}"] for end in ("low", "high")}
+        labels = {"share": found["quantile"].values.tolist()}
+    else:
+        si = found[dimension(path)].attrs.get("units", "1")
+        columns = {"value": found[dimension(path)], "error": found["error"]}
+        does = np.where(found["begins"] == 1, "begins", "ends").tolist()
+        labels = {"does": does, "beyond": words(found["beyond"]).values.tolist()}
+    numbers = {name: in_unit(column.assign_attrs(units=si), unit) for name, column in columns.items()}
+    labels |= {name: column.values.tolist() for name, column in numbers.items()}
+    return {
+        "path": path,
+        "regime": found.attrs["boundary_of"],
+        "unit": numbers["value"].attrs["units"],
+        "thresholds": [dict(zip(labels, row, strict=True)) for row in zip(*labels.values(), strict=True)],
+        "scan": found.attrs["scan"],
+    }
+
+
 def in_words(found: xr.Dataset) -> str:
     """What :func:`threshold` found, a line for each threshold."""
-    path, regime = found.attrs["threshold_path"], found.attrs["boundary_of"]
-    unit = found.attrs.get("threshold_unit", "")
+    told = plain(found)
+    path, regime, unit = told["path"], told["regime"], after_number(told["unit"])
     if "quantile" in found.dims:
-        return "\n".join(
-            [f"{regime} begins at {path}, by its probability (95 % interval):", *_quantiles_in_words(found, unit)]
-        )
-    axis = found[dimension(path)]
-    allowed = in_unit(found["error"].assign_attrs(units=axis.attrs.get("units", "1")), unit)
-    axis = in_unit(axis, unit)
-    lines = []
-    for value, error, begins, beyond in zip(
-        axis.values, allowed.values, found["begins"].values, words(found["beyond"]).values, strict=True
-    ):
-        does, side = ("begins", "below") if begins else ("ends", "above")
-        lines.append(f"{regime} {does} at {path} = {_with_error(value, error)}{_unit(axis)}; {side}: {beyond}")
-    if not lines:
-        lines.append(f"{regime} neither begins nor ends along {path}")
-    return "\n".join([*lines, f"scan: {found.attrs['scan']}; {_MISSED}"])
-
-
-def _quantiles_in_words(found: xr.Dataset, unit: str) -> list[str]:
-    si = found["threshold"].attrs.get("units", "1")
-    ends = [in_unit(found[f"threshold_quantile{end}"].assign_attrs(units=si), unit) for end in ("", "_low", "_high")]
-    lines = []
-    for level, value, low, high in zip(found["quantile"].values, *(end.values for end in ends), strict=True):
-        lines.append(f"  {level:.0%} below {_number(value, ends[0])} ({low:.6g} to {high:.6g})")
-    values = found["threshold"].values
-    counts = {
-        "begin at the first value or before": np.count_nonzero(np.isneginf(values)),
-        "begin nowhere there": np.count_nonzero(np.isposinf(values)),
-        "are not known, for lack of certified runs": np.count_nonzero(np.isnan(values)),
-    }
-    told = "".join(f"; {count} {what}" for what, count in counts.items() if count)
-    return [*lines, f"scan: {found.attrs['scan']}{told}; {_MISSED}"]
+        values = found["threshold"].values
+        counts = {
+            "begin at the first value or before": np.count_nonzero(np.isneginf(values)),
+            "begin nowhere there": np.count_nonzero(np.isposinf(values)),
+            "are not known, for lack of certified runs": np.count_nonzero(np.isnan(values)),
+        }
+        lines = [f"{regime} begins at {path}, by its probability (95 % interval):"]
+        for one in told["thresholds"]:
+            interval = f"({one['low']:.6g} to {one['high']:.6g})"
+            lines.append(f"  {one['share']:.0%} below {one['value']:.6g}{unit} {interval}")
+        told["scan"] += "".join(f"; {count} {what}" for what, count in counts.items() if count)
+    else:
+        lines = []
+        for one in told["thresholds"]:
+            at = f"{path} = {_with_error(one['value'], one['error'])}{unit}"
+            side = "below" if one["does"] == "begins" else "above"
+            lines.append(f"{regime} {one['does']} at {at}; {side}: {one['beyond']}")
+    return "\n".join(
+        [*(lines or [f"{regime} neither begins nor ends along {path}"]), f"scan: {told['scan']}; {_MISSED}"]
+    )

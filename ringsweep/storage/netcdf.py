@@ -215,6 +215,7 @@ KINDS = {
     "probability": "a sampled sweep",
     "residual": "a fit",
     "vertex": "a boundary",
+    "threshold": "a distribution of thresholds",
     "regime": "a sweep",
 }
 
