@@ -1,4 +1,4 @@
-"""Picture of a fit: measurements, the fitted history, residuals."""
+"""look.Picture of a fit: measurements, the fitted history, residuals."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.labels import displayed, long_name, unit_text
-from ringsweep.plots.look import PAIR_COLOURS, SMALL, Picture, figure_width, legend_above, on_page, small_ticks
 
 
 def fit(ds: xr.Dataset) -> Figure:
@@ -41,18 +41,18 @@ def fit(ds: xr.Dataset) -> Figure:
     """
     if not {"measured", "fitted"} <= set(ds):
         raise InputError("ds", "is no fit: ringsweep fit makes one")
-    figure = Picture(figsize=(figure_width(), 0.7 * figure_width()), layout="constrained")
+    figure = look.Picture(figsize=(look.figure_width(), 0.7 * look.figure_width()), layout="constrained")
     data, rest = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    one, two = (on_page(colour) for colour in PAIR_COLOURS)
+    one, two = look.pair(0), look.pair(1)
     time, unit = ds["t"].values, unit_text(ds["measured"])
     measured, fitted, residual = (displayed(ds[name]).values for name in ("measured", "fitted", "residual"))
     data.plot(time, measured, ".", color=two, markersize=3, label="measured")
     data.plot(time, fitted, color=one, label="fitted")
-    data.set_ylabel(f"{textwrap.fill(long_name(ds['measured']), 18)} ({unit})", fontsize=SMALL)
-    legend_above(data)
+    data.set_ylabel(f"{textwrap.fill(long_name(ds['measured']), 18)} ({unit})", fontsize=look.SMALL)
+    look.legend_above(data)
     rest.axhline(0.0, color=one, linewidth=1.0)
     rest.plot(time, residual, ".", color=two, markersize=3)
-    rest.set_xlabel("time (s)", fontsize=SMALL)
-    rest.set_ylabel(f"residual ({unit})", fontsize=SMALL)
-    small_ticks(data, rest)
+    rest.set_xlabel("time (s)", fontsize=look.SMALL)
+    rest.set_ylabel(f"residual ({unit})", fontsize=look.SMALL)
+    look.small_ticks(data, rest)
     return figure

@@ -31,7 +31,7 @@ _CLIPPED = ("epsilon", "friction_force")
 # Impact speeds below this share of the greatest are not shown: the last rebounds of a contact are endless.
 _WEAKEST = 1e-4
 
-# Intervals of time into which a long history is condensed: more than a printed panel has pixels.
+# Intervals of time whose states are drawn: more than a printed panel has pixels.
 _INTERVALS = 4000
 
 # Cycles from which on a printed curve is a block; cycles that are then drawn beside it; and steps of its envelope.
@@ -244,7 +244,7 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain: bool
             if band is not None:
                 _draw_range(axes, time, numbers, band, **curve)
             else:
-                axes.plot(*_envelope(time, numbers), linestyle=look.PAIR_STYLES[k], linewidth=1, **curve)
+                axes.plot(time, numbers, linestyle=look.PAIR_STYLES[k], linewidth=1, **curve)
         _mark_separation(axes, ds, names)
     look.legend_above(axes)
     axes.set_ylabel(_short_label(ds, first))
@@ -346,7 +346,7 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
     regimes = words(ds["regime"]).values if "regime" in ds else None
     for k, law in enumerate(ds["friction_law"].values):
         label = str(law) if regimes is None else f"{law}: {regimes[k]}"
-        axes.plot(*_envelope(ds["time"].values, numbers[k]), label=label, **_law_style(k))
+        axes.plot(ds["time"].values, numbers[k], label=label, **_law_style(k))
     axes.set_ylabel(_short_label(ds, name))
     axes.margins(x=0)
     if name.startswith(("normal", "gap")):
@@ -467,18 +467,6 @@ def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any], loc: Literal["le
         axes.set_ylim(low - margin, high + margin)
         ends = number_text(values[0]), number_text(values[-1])
         axes.set_title(f"axis clipped; values from {ends[0]} to {ends[1]}", fontsize=look.SMALL, loc=loc)
-
-
-def _envelope(time: NDArray[Any], numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Least and greatest value in each short interval of a long history, which looks the same and draws faster."""
-    if len(time) <= 4 * _INTERVALS:
-        return time, numbers
-    starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _INTERVALS, endpoint=False)))
-    low, high = np.fmin.reduceat(numbers, starts), np.fmax.reduceat(numbers, starts)
-    # Least value first where the curve falls would make the line zigzag and fill the gaps between dashes.
-    falls = numbers[starts] > numbers[np.append(starts[1:], len(time)) - 1]
-    extremes = np.where(falls, (high, low), (low, high))
-    return np.repeat(time[starts], 2), extremes.T.ravel()
 
 
 def _by_interval(time: NDArray[Any], states: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

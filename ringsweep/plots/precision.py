@@ -13,24 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ringsweep.errors import InputError
+from ringsweep.plots import look
 from ringsweep.plots.datasets import resolve
 from ringsweep.plots.labels import axis_label, number_text
-from ringsweep.plots.look import (
-    CURVE_COLOURS,
-    CURVE_STYLES,
-    GRID,
-    SMALL,
-    Picture,
-    axes_or_current,
-    figure_width,
-    folded,
-    is_narrow,
-    label_axes,
-    on_page,
-    page_colour,
-    place_legend,
-    width_of,
-)
 
 # Error above which a run has diverged: no axis need reach beyond it.
 _DIVERGED = 1e3
@@ -40,7 +25,7 @@ _OWN = ("implicit", "event", "rk4")
 
 # One colour is one method. The number of markers and the number of colours have no common factor, so a pair of the two
 # returns only after 143 methods.
-_METHOD_COLOURS = (*CURVE_COLOURS, "#882255", "#999933", "#332288", "#7F7F7F", "#661100", "#44AA99")
+_METHOD_COLOURS = (*look.CURVE_COLOURS, "#882255", "#999933", "#332288", "#7F7F7F", "#661100", "#44AA99")
 _METHOD_MARKERS = ("o", "s", "^", "D", "v", "P", "<", "p", ">", "h", "*")
 
 
@@ -70,8 +55,8 @@ def work_precision(ds: xr.Dataset, error: str = "error_end") -> Figure:
     Traceback (most recent call last):
     ringsweep.errors.InputError: ds: has no contender, cell, time_per_run, method: it is not error against run time
     """
-    width = figure_width()
-    figure = Picture(figsize=(width, (1.15 if is_narrow(width) else 0.63) * width), layout="constrained")
+    width = look.figure_width()
+    figure = look.Picture(figsize=(width, (1.15 if look.is_narrow(width) else 0.63) * width), layout="constrained")
     precision_panel(ds, error, figure.add_subplot())
     return figure
 
@@ -141,18 +126,18 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
     low, high = np.clip(median, floor, ceiling), np.clip(largest, floor, ceiling)
     wrong = (ds["regime_wrong"] == 1).any("cell").values if "regime_wrong" in ds else np.zeros(len(numbers), bool)
 
-    ax = axes_or_current(ax, 0.63)
+    ax = look.axes_or_current(ax, 0.63)
     ax.set_xscale("log")
     ax.set_yscale("log")
-    ax.grid(True, color=on_page(GRID), linewidth=0.6)
+    ax.grid(True, color=look.on_page(look.GRID), linewidth=0.6)
     ax.set_axisbelow(True)
     curves: list[Artist] = []
     entries: list[Artist] = []
     if f"reference_{error}" in ds and (uncertainty := np.nanmedian(ds[f"reference_{error}"])) > 0.0:
-        ax.axhspan(0.0, uncertainty, color=on_page("#EEEEEE"), linewidth=0)
-        entries.append(Patch(color=on_page("#EEEEEE"), label="within the median\nuncertainty of the reference"))
+        ax.axhspan(0.0, uncertainty, color=look.on_page("#EEEEEE"), linewidth=0)
+        entries.append(Patch(color=look.on_page("#EEEEEE"), label="within the median\nuncertainty of the reference"))
     if target := ds.attrs.get("target"):
-        dashed: dict[str, Any] = {"color": on_page("0.25"), "linewidth": 1, "linestyle": (0, (5, 3))}
+        dashed: dict[str, Any] = {"color": look.on_page("0.25"), "linewidth": 1, "linestyle": (0, (5, 3))}
         ax.axhline(target, **dashed)
         entries.append(Line2D([], [], **dashed, label=f"target, {number_text(target)}"))
     drawn = dict.fromkeys(methods[rows].tolist())
@@ -165,10 +150,10 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
         ax.errorbar(seconds[own], low[own], yerr=[np.zeros(len(own)), high[own] - low[own]], **bars)
         curves += ax.plot(seconds[own], low[own], label=str(method), **style)
         hollow = own[wrong[own]]
-        ax.plot(seconds[hollow], low[hollow], **style | {"linestyle": "", "markerfacecolor": page_colour()})
+        ax.plot(seconds[hollow], low[hollow], **style | {"linestyle": "", "markerfacecolor": look.page_colour()})
     if wrong[rows].any():
-        circle: dict[str, Any] = {"color": on_page("0.4"), "linestyle": "", "marker": "o"}
-        circle["markerfacecolor"] = page_colour()
+        circle: dict[str, Any] = {"color": look.on_page("0.4"), "linestyle": "", "marker": "o"}
+        circle["markerfacecolor"] = look.page_colour()
         entries.append(Line2D([], [], label="hollow: a regime\nis wrong in some cell", **circle))
     failure = "failed" + " or diverged" * bool(np.isfinite(median[diverged]).any()) + " (at the ceiling)"
     for height, where, arrow, meaning in (
@@ -176,31 +161,31 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
         (1.7 * ceiling, diverged[rows], "$\\uparrow$", failure),
     ):
         if where.any():
-            arrows: dict[str, Any] = {"color": on_page("black"), "marker": arrow, "linestyle": "", "markersize": 8}
+            arrows: dict[str, Any] = {"color": look.on_page("black"), "marker": arrow, "linestyle": "", "markersize": 8}
             ax.plot(seconds[rows[where]], np.full(where.sum(), height), **arrows)
             entries.append(Line2D([], [], label=meaning, **arrows))
     if "recommended" in ds.attrs and "solver" in ds.coords:
         (chosen,) = np.flatnonzero(ds["solver"].values == ds.attrs["recommended"])[:1]
-        circle = {"color": on_page("black"), "marker": "o", "markerfacecolor": "none", "linestyle": ""}
+        circle = {"color": look.on_page("black"), "marker": "o", "markerfacecolor": "none", "linestyle": ""}
         ax.plot(seconds[chosen], low[chosen], markersize=13, markeredgewidth=1.4, **circle)
         meaning = "recommended:\n" + str(ds.attrs["recommended"]).replace("method: ", "")
         entries.append(Line2D([], [], markersize=9, label=meaning, **circle))
     cells = ds.sizes["cell"]
     if cells > 1:
         text = f"points: median of {cells} cells; bars: up to the largest"
-        ax.set_title(folded([text], width_of(ax)), fontsize=SMALL, loc="left")
+        ax.set_title(look.folded([text], look.width_of(ax)), fontsize=look.SMALL, loc="left")
     # A target is given in rad, so errors of angles are too.
-    label_axes(ax, axis_label(ds["time_per_run"], ds), axis_label(ds[error], ds).replace("(°)", "(rad)"))
-    place_legend(ax, [*curves, *entries], handlelength=3)
+    look.label_axes(ax, axis_label(ds["time_per_run"], ds), axis_label(ds[error], ds).replace("(°)", "(rad)"))
+    look.place_legend(ax, [*curves, *entries], handlelength=3)
     return ax
 
 
 def _method_style(number: int) -> dict[str, Any]:
     """Line and marker of a method; `number` counts from 0."""
     return {
-        "color": on_page(_METHOD_COLOURS[number % len(_METHOD_COLOURS)]),
+        "color": look.on_page(_METHOD_COLOURS[number % len(_METHOD_COLOURS)]),
         "marker": _METHOD_MARKERS[number % len(_METHOD_MARKERS)],
         "markersize": 5.5,
-        "linestyle": CURVE_STYLES[number // len(_METHOD_COLOURS) % len(CURVE_STYLES)],
+        "linestyle": look.CURVE_STYLES[number // len(_METHOD_COLOURS) % len(look.CURVE_STYLES)],
         "linewidth": 1.3,
     }

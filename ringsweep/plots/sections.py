@@ -402,21 +402,16 @@ def _require_section(ds: xr.Dataset) -> None:
         raise InputError("ds", "has no section: give record: {section: {at: period}} in the configuration")
 
 
-def _require_diagram(ds: xr.Dataset) -> None:
-    _require_section(ds)
-    if not has_diagram(ds):
-        along = ", ".join(_axes_of(ds, points_of(ds)[0])) or "no axis"
-        raise InputError("ds", f"has sections along {along}, and a diagram has one axis: hold the others by sel")
-
-
 def _axis(ds: xr.Dataset, x: str | None, needed: str | None = None) -> Axis:
     """The axis of a diagram."""
     if needed is None:
-        _require_diagram(ds)
-        needed = points_of(ds)[0]
-    dims = _axes_of(ds, needed)
+        _require_section(ds)
+    dims = _axes_of(ds, needed or points_of(ds)[0])
     if len(dims) != 1:
-        raise InputError("ds", f"has no {needed} along one axis: record: {{exponent: true}} gives it")
+        problem = f"sections along {', '.join(dims) or 'no axis'}, and a diagram has one axis: hold the others by sel"
+        if needed is not None:
+            problem = f"no {needed} along one axis: record: {{exponent: true}} gives it"
+        raise InputError("ds", f"has {problem}")
     (dim,) = dims
     along = [str(name) for name, coordinate in ds.coords.items() if coordinate.dims == (dim,)]
     name = resolve("x", x, along) if x else next(iter([*along, dim]))
