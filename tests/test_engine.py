@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -165,11 +164,10 @@ class TestProgress:
     def test_long_sweep_without_a_terminal_tells_how_far_it_is_after_a_minute_and_then_seldom(
         self, monkeypatch, caplog
     ):
-        clock = iter([0.0, 30.0, 61.0, 100.0, 121.0, 123.0, 200.0])
-        # Only there: other threads read the clock of the module `time` too.
-        monkeypatch.setattr(executors, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+        now = [0.0]
+        monkeypatch.setattr("tqdm.std.time", lambda: now[0])
         with caplog.at_level("INFO", "ringsweep"), executors.progress_bar(60, True) as bar:
-            for _ in range(6):
+            for now[0] in (30.0, 61.0, 100.0, 121.0, 123.0, 200.0):
                 bar.update(10)
         assert caplog.messages == ["20 runs of 60: about 2 min left", "50 runs of 60: about 25 s left"]
 

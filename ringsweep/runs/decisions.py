@@ -128,8 +128,8 @@ def refine(
     Decided
     """
     grid = _Grid(shape, stride, within)
-    yield from grid.coarse()
-    while grid.can_be_halved:
+    yield from grid.compute(np.arange(grid.labels.size))
+    while not grid.is_finest:
         yield from grid.halve()
     return (yield from _audited(grid, audit, np.random.default_rng(seed)))
 
@@ -153,13 +153,9 @@ class _Grid:
         self.rough = None if within is None else np.ones(lattice, dtype=bool)
 
     @property
-    def can_be_halved(self) -> bool:
-        """Whether the lattice is coarser than the grid."""
-        return self.labels.shape != self.shape
-
-    def coarse(self) -> Generator[Cells, Answer]:
-        """Compute all points of the coarse lattice."""
-        yield from self.compute(np.arange(self.labels.size))
+    def is_finest(self) -> bool:
+        """Whether the lattice is the grid."""
+        return self.labels.shape == self.shape
 
     def halve(self) -> Generator[Cells, Answer]:
         """Halve all intervals, and compute what cannot be inferred."""
@@ -213,7 +209,7 @@ class _Grid:
             far = ~(np.abs(self.values.flat[points] - answer.values) <= self.within)
             far &= ~(np.isnan(self.values.flat[points]) & np.isnan(answer.values))
             self.values.flat[points], self.rough.flat[points] = answer.values, far
-            surprising |= far & (not self.can_be_halved)
+            surprising |= far & self.is_finest
         return surprising
 
     def _beside_others(self) -> Cells:

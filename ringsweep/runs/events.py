@@ -140,10 +140,6 @@ def events(run: xr.Dataset, outcome: xr.Dataset, told: Iterable[Events] = ()) ->
 
 def side_by_side(tables: dict[str, xr.Dataset]) -> xr.Dataset:
     """Events under several friction laws; shorter tables are filled with NaN and ``none``."""
-    longest = max(table.sizes["event"] for table in tables.values())
-    filled = []
-    for table in tables.values():
-        end = {"event": (0, longest - table.sizes["event"])}
-        filler = {"event_time": np.nan, "event_kind": 0, "event_contact": 0}
-        filled.append(table.pad(end, constant_values=filler, keep_attrs=True).astype(table.dtypes))
-    return xr.concat(filled, "friction_law")
+    numbered = [table.assign_coords(event=np.arange(table.sizes["event"])) for table in tables.values()]
+    filler = {"event_time": np.nan, "event_kind": 0, "event_contact": 0}
+    return xr.concat(numbered, "friction_law", join="outer", fill_value=filler).drop_vars("event")

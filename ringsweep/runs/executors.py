@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+import io
 import logging
-import math
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import resource_tracker
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import joblib
 import numpy as np
 from joblib.parallel import get_active_backend
 from numpy.typing import NDArray
-from tqdm.auto import tqdm
+from tqdm.auto import tqdm as bar
+from tqdm.std import tqdm
 
 from ringsweep.errors import InputError
 from ringsweep.runs.needs import duration
@@ -264,36 +264,21 @@ def progress_bar(total: int | None, progress: bool, done: int = 0, unit: str = "
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     notebook = hasattr(shell, "kernel")
     if progress and not notebook and not sys.stderr.isatty():
-        return _ProgressLines(total, done, unit)
-    return tqdm(total=total, initial=done, unit=unit, disable=not progress)
+        seldom: dict[str, Any] = {"delay": FIRST_LINE, "mininterval": FIRST_LINE, "miniters": 1, "leave": False}
+        return _ProgressLines(total=total, initial=done, unit=unit, file=io.StringIO(), **seldom)
+    return bar(total=total, initial=done, unit=unit, disable=not progress)
 
 
-class _ProgressLines:
-    """Progress as lines of a log, with the methods of a bar that are used here."""
+class _ProgressLines(tqdm):
+    """Progress as lines of a log."""
 
-    def __init__(self, total: int | None, done: int, unit: str) -> None:
-        self._total, self._done, self._first, self._unit = total, done, done, unit
-        self._began, self._next = time.monotonic(), FIRST_LINE
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Tell no more."""
-        self._next = math.inf
-
-    def update(self, count: int = 1) -> None:
-        """Count what is done, and tell it if it is time."""
-        self._done += count
-        since = time.monotonic() - self._began
-        if since < self._next or self._done == self._total:
+    def display(self, msg: str | None = None, pos: int | None = None) -> None:
+        """Tell how far it is, and again when the time since the start has doubled; the end has the message ''."""
+        since = self.format_dict["elapsed"]
+        if since < FIRST_LINE or self.n == self.total or msg == "":
             return
-        self._next = 2.0 * since
-        left = ""
-        if self._total is not None:
-            rest = since * (self._total - self._done) / max(self._done - self._first, 1)
-            left = f" of {self._total}: about {duration(rest)} left"
-        logger.info("%d %ss%s", self._done, self._unit, left)
+        self.mininterval, left = since, ""
+        if self.total is not None:
+            rest = since * (self.total - self.n) / max(self.n - self.initial, 1)
+            left = f" of {self.total}: about {duration(rest)} left"
+        logger.info("%d %ss%s", self.n, self.unit, left)
