@@ -276,18 +276,17 @@ class TestFilesThatDoNotGoOn:
     def test_sound_file_goes_on(self, file):
         assert load({"scene": changed(LUGRE, "initial", **{"from": str(file())})}).scene.values["initial.x"] == 0.01
 
-    @pytest.mark.parametrize("regime", ["failed", "separating", "jammed"])
-    def test_run_that_ended_early(self, file, regime):
-        self.refused(file(regime=regime), f"is {regime}")
-
-    def test_run_without_a_number(self, file):
-        self.refused(file(x_end=np.nan), "no run that can go on")
-
-    def test_text_in_place_of_a_number(self, file):
-        self.refused(file(x_end="far"), "holds no run, or is damaged")
-
-    def test_several_runs(self, file):
-        self.refused(file(runs=(2,)), "holds 2 runs")
+    @pytest.mark.parametrize(
+        ("about", "problem"),
+        [
+            *(({"regime": regime}, f"is {regime}: it has no state") for regime in ("failed", "separating", "jammed")),
+            ({"x_end": np.nan}, "is not the result of a run that can go on"),
+            ({"x_end": "far"}, "is not the result of a run that can go on"),
+            ({"runs": (2,)}, "holds 2 runs"),
+        ],
+    )
+    def test_what_is_no_state_that_could_go_on(self, file, about, problem):
+        self.refused(file(**about), problem)
 
     @pytest.mark.parametrize("damage", ["changed", "cut"])
     def test_damaged_bytes(self, file, damage):

@@ -200,23 +200,20 @@ def _end_of(file: str, model: Continues) -> dict[str, NDArray[np.float64]]:
     InputError
         If the file is damaged, or does not hold one run that reached the end of its span.
     """
-    where = "scene.initial.from"
     try:
-        with trailer.opened(file, whole=True) as content:
+        with trailer.opened(file, whole=True, what="the result of a run that can go on") as content:
+            regime = content["regime"]
+            flags = np.ravel(regime[:])
+            if len(flags) != 1:
+                raise InputError("", f"holds {len(flags)} runs: name a file of one run")
+            meanings = dict(zip(regime.flag_values, regime.flag_meanings.split(), strict=True))
+            if (ended := meanings.get(flags[0])) in _ENDED_EARLY:
+                raise InputError("", f"its run is {ended}: it has no state that could go on")
             names = [name for name in ("t_end", *model.ends, "deflection_end") if name in content.variables]
-            flags = np.ravel(content["regime"][:])
-            meanings = dict(zip(content["regime"].flag_values, content["regime"].flag_meanings.split(), strict=True))
             found = {name: np.ma.filled(content[name][:], np.nan).astype(float).ravel() for name in names}
+            found.setdefault("deflection_end", np.zeros(1))
+            if not all(np.isfinite(found[name]).all() for name in ("t_end", *model.ends, "deflection_end")):
+                raise ValueError("a state has finite numbers")
     except InputError as error:
-        raise InputError(where, f"{file}: {error.problem}") from None
-    except Exception:
-        # On a damaged file the libraries raise errors of many kinds.
-        raise InputError(where, f"{file} holds no run, or is damaged") from None
-    if len(flags) != 1:
-        raise InputError(where, f"{file} holds {len(flags)} runs: name a file of one run")
-    if (regime := meanings.get(flags[0])) in _ENDED_EARLY:
-        raise InputError(where, f"the run in {file} is {regime}: it has no state that could go on")
-    found.setdefault("deflection_end", np.zeros(1))
-    if not {"t_end", *model.ends} <= found.keys() or not all(np.isfinite(number).all() for number in found.values()):
-        raise InputError(where, f"{file} holds no run that can go on")
+        raise InputError("scene.initial.from", f"{file}: {error.problem}") from None
     return found

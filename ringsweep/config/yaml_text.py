@@ -22,7 +22,7 @@ import yaml
 
 from ringsweep.errors import InputError
 from ringsweep.quantities import trailer
-from ringsweep.quantities.units import LONG_INTEGER, NUMBER, length_of, show, spelled
+from ringsweep.quantities.units import LONG_INTEGER, NUMBER, show, spelled
 from ringsweep.quantities.variables import written
 
 logger = logging.getLogger("ringsweep")
@@ -197,31 +197,21 @@ def _opened(file: Path) -> BinaryIO:
 
 def _read_result(file: Path) -> Document:
     """The configuration in the attributes of a result file."""
-    try:
-        with trailer.opened(file) as content:
-            others = {"time", "contender", "word"} & set(content.dimensions)
-            is_sweep = "regime" in content.variables and not others
-            tree = json.loads(content.getncattr("configuration"))
-            if not isinstance(tree, dict):
-                raise ValueError("a configuration is a mapping")
-            if "from" in (written(tree, "initial") or {}):
-                raise InputError("", "is damaged: a result holds its initial values", file=str(file))
-            found = None
-            if is_sweep:
-                found = {
-                    variable.path: (variable.dimensions, np.array(variable[:].tolist()))
-                    for variable in content.variables.values()
-                    if "path" in variable.ncattrs()
-                }
-                dims = content["regime"].dimensions
-                found = dict(sorted(found.items(), key=lambda item: dims.index(item[1][0][0])))
-    except InputError:
-        raise
-    except Exception as error:
-        # On a damaged file the NetCDF library raises errors of many kinds.
-        raise InputError(
-            "", "is damaged, or not a result of ringsweep: it holds no configuration", file=str(file)
-        ) from error
+    with trailer.opened(file, what="a result of ringsweep with a configuration") as content:
+        tree = json.loads(content.getncattr("configuration"))
+        if not isinstance(tree, dict):
+            raise ValueError("a configuration is a mapping")
+        if "from" in (written(tree, "initial") or {}):
+            raise InputError("", "is damaged: a result holds its initial values")
+        found = None
+        if "regime" in content.variables and not {"time", "contender", "word"} & set(content.dimensions):
+            found = {
+                variable.path: (variable.dimensions, np.array(variable[:].tolist()))
+                for variable in content.variables.values()
+                if "path" in variable.ncattrs()
+            }
+            dims = content["regime"].dimensions
+            found = dict(sorted(found.items(), key=lambda item: dims.index(item[1][0][0])))
     return Document(_Reader().value(tree), file.parent, file.stem, {"": (str(file), None)}, found)
 
 
@@ -251,10 +241,12 @@ class _Reader:
     def __init__(self, file: str | None = None):
         self.file = file
         self.locations: dict[str, tuple[str, int | None]] = {}
+        self.count = 0
 
     def value(self, given: Any, path: str = "", depth: int = 0) -> Any:
         """Plain value of what stands at a path."""
-        if depth == 0 and _count(given, {}) > MAX_VALUES:
+        self.count += 1
+        if self.count > MAX_VALUES:
             problem = f"more than {MAX_VALUES} values after expanding aliases; put long columns into a CSV file"
             raise InputError("", problem, file=self.file)
         if isinstance(given, yaml.Node):
@@ -291,22 +283,6 @@ class _Reader:
             self.locations[_join(path, key.value)] = self.file or "", line
             found[key.value] = child
         return found
-
-
-def _count(value: Any, known: dict[int, int], depth: int = 0) -> int:
-    """Number of values of YAML nodes or of nested containers, in a time that parts which occur often do not prolong."""
-    parts: Any = value.value if isinstance(value, yaml.CollectionNode) else value
-    if isinstance(value, yaml.MappingNode):
-        parts = [child for _, child in parts]
-    elif isinstance(value, Mapping):
-        parts = value.values()
-    elif not isinstance(parts, list | tuple):
-        return length_of(value) if isinstance(value, np.ndarray | range) else 1
-    if id(value) not in known:
-        # A part that contains itself is refused later, as one that is nested too deeply.
-        known[id(value)] = 1
-        known[id(value)] += sum(_count(part, known, depth + 1) for part in parts) if depth <= _MAX_DEPTH else 0
-    return known[id(value)]
 
 
 def _plain(value: Any, path: str) -> str | bool | int | float | None:

@@ -88,27 +88,45 @@ def _check(path: str, compare: bool, size: int, *_: int) -> bool:
 
 
 @contextmanager
-def opened(path: str | os.PathLike[str], *, whole: bool = False) -> Iterator[netCDF4.Dataset]:
-    """An open NetCDF file whose seal fits, if it has one. No variable is read yet.
+def telling_damage(path: str | os.PathLike[str], what: str = "a NetCDF file") -> Iterator[None]:
+    """A block that reads a file, in which an error of any kind means that the file is damaged, or not `what`.
+
+    On a damaged file the libraries raise errors of many kinds.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(str(path), error.problem) from error
+    except PermissionError as error:
+        raise InputError(str(path), "cannot be read: permission denied") from error
+    except Exception as error:
+        raise InputError(str(path), f"is not {what}, or is damaged") from error
+
+
+@contextmanager
+def opened(
+    path: str | os.PathLike[str], *, whole: bool = False, what: str = "a NetCDF file"
+) -> Iterator[netCDF4.Dataset]:
+    """An open NetCDF file whose seal fits, if it has one, for a block as of :func:`telling_damage`.
 
     Raises
     ------
     InputError
-        As :func:`check`, or if it declares more cells than a sweep can have, or more numbers than the file can hold.
-    OSError
-        If it is no NetCDF file.
+        As :func:`check`; if the file declares more cells than a sweep can have, or more numbers than it can hold; or if
+        it cannot be read.
     """
-    sealed = check(path, whole=whole)
-    with netCDF4.Dataset(Path(path).resolve()) as file:
-        regime = file.variables.get("regime")
-        if regime is not None and (cells := math.prod(regime.shape)) > MAX_CELLS:
-            raise InputError(str(path), f"declares {cells:.3g} cells: a file holds at most {MAX_CELLS:.3g}")
-        declared, there = sum(map(_bytes, file.variables.values())), Path(path).stat().st_size
-        if declared > _MOST_COMPRESSED * there:
-            raise InputError(str(path), f"declares {declared:.3g} bytes of numbers, which {there} bytes cannot hold")
-        if not sealed and "ringsweep_version" in file.ncattrs():
-            _warn_of_no_seal(str(path), Path(path).stat().st_mtime_ns)
-        yield file
+    with telling_damage(path, what):
+        sealed = check(path, whole=whole)
+        with netCDF4.Dataset(Path(path).resolve()) as file:
+            regime = file.variables.get("regime")
+            if regime is not None and (cells := math.prod(regime.shape)) > MAX_CELLS:
+                raise InputError("", f"declares {cells:.3g} cells: a file holds at most {MAX_CELLS:.3g}")
+            declared, there = sum(map(_bytes, file.variables.values())), Path(path).stat().st_size
+            if declared > _MOST_COMPRESSED * there:
+                raise InputError("", f"declares {declared:.3g} bytes of numbers, which {there} bytes cannot hold")
+            if not sealed and "ringsweep_version" in file.ncattrs():
+                _warn_of_no_seal(str(path), Path(path).stat().st_mtime_ns)
+            yield file
 
 
 def _bytes(variable: Any) -> int:

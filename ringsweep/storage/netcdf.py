@@ -275,23 +275,19 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     The dataset is a context manager that closes the file. Parameters and errors are those of :func:`load`.
     """
     _check_exists(path)
-    with _reading_file(path), trailer.opened(path):
-        pass
-    with _reading_file(path), _small_caches():
+    with trailer.telling_damage(path), _small_caches():
+        with trailer.opened(path):
+            pass
         # Decoding would turn numbers of seconds into timedelta64.
         ds = xr.open_dataset(Path(path).resolve(), engine="netcdf4", decode_times=False)
-    try:
-        missing = [name for name in SIGNATURE if name not in ds.attrs]
-        if missing:
-            raise InputError(
-                str(path),
-                f"was not written by ringsweep: its attributes lack {' and '.join(missing)}; give a result file",
-            )
-        with _reading_file(path):
+        try:
+            if missing := [name for name in SIGNATURE if name not in ds.attrs]:
+                lacking = f"its attributes lack {' and '.join(missing)}; give a result file"
+                raise InputError(str(path), f"was not written by ringsweep: {lacking}")
             _check_attributes(ds)
-    except InputError:
-        ds.close()
-        raise
+        except BaseException:
+            ds.close()
+            raise
     # That of an earlier version does not hold for what is made of the dataset.
     ds.attrs.pop("digest", None)
     return ds
@@ -310,7 +306,7 @@ def reading(path: str | os.PathLike[str]) -> Iterator[xr.Dataset]:
             raise
         except Exception as error:
             if "NetCDF: " in str(error):
-                raise InputError(str(path), _DAMAGED) from error
+                raise InputError(str(path), "is not a NetCDF file, or is damaged") from error
             if isinstance(error, OSError) or trailer.check(path, whole=True):
                 raise
             problem = f"is not what ringsweep writes ({type(error).__name__}: {error})"
@@ -331,7 +327,7 @@ def check(path: str | os.PathLike[str]) -> bool:
         If the file is not what was written, or as for :func:`load`.
     """
     _check_exists(path)
-    with _reading_file(path):
+    with trailer.telling_damage(path):
         sealed = trailer.check(path, whole=True)
     open_dataset(path).close()
     return sealed
@@ -362,9 +358,6 @@ def verify(path: str | os.PathLike[str]) -> None:
         raise InputError(str(path), "no seal: another program or an older version wrote it. Nothing is known")
 
 
-_DAMAGED = "is not a NetCDF file, or is damaged"
-
-
 def _check_exists(path: str | os.PathLike[str]) -> None:
     try:
         kind = Path(path).stat().st_mode
@@ -377,19 +370,6 @@ def _check_exists(path: str | os.PathLike[str]) -> None:
     if Path(path).suffix.lower() in (".yaml", ".yml"):
         raise InputError(str(path), f"is a configuration, not a result: `ringsweep run {path}` writes one")
     check_name(path)
-
-
-@contextmanager
-def _reading_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    try:
-        yield
-    except PermissionError as error:
-        raise InputError(str(path), "cannot be read: permission denied") from error
-    except InputError as error:
-        raise InputError(str(path), error.problem) from error
-    except Exception as error:
-        # On a damaged file the libraries raise errors of many kinds.
-        raise InputError(str(path), _DAMAGED) from error
 
 
 def _check_attributes(ds: xr.Dataset) -> None:
