@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import difflib
-import os
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
-from typing import TextIO
 
 
 def shortened(text: str, most: int) -> str:
@@ -25,17 +23,11 @@ def escaped(text: str) -> str:
     return text.translate(_CONTROL)
 
 
-def is_coloured(stream: TextIO) -> bool:
-    """Whether messages on a stream have colours."""
-    return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
-
-
 def print_error(message: str) -> None:
     """Print an error of a command on stderr, in one line."""
-    prefix = "\033[1;31mringsweep:\033[0m" if is_coloured(sys.stderr) else "ringsweep:"
     # The exit status tells of the error too, even if the message cannot be written.
     with suppress(OSError):
-        print(prefix, escaped(" ".join(message.split())), file=sys.stderr, flush=True)
+        print("ringsweep:", escaped(" ".join(message.split())), file=sys.stderr, flush=True)
 
 
 def nearest_name(word: object, known: Iterable[str]) -> str | None:

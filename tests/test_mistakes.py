@@ -122,7 +122,11 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"of": {"friction.mu_s": {"over": "mu_j", "uniform": [1, 2]}}}, f"{OF}.over", "'mu_j' is no number of the scene;"),
     ({"of": {"friction.mu_s": {"over": ["mu_k"], "uniform": [1, 2]}}}, f"{OF}.over", "['mu_k'] is no number"),
     ({"of": {"body.mass": {"normal": [1, 0.5]}}}, "sweep.sample.of.body.mass", "normal(1, 0.5) has probability 0.023"),
-    ({"of": {"friction.mu_k": {"uniform": [0.1, 0.2]}}}, "scene.friction.mu_k", "50.0% of the points of the sample"),
+    (
+        {"of": {"friction.mu_k": {"uniform": [0.1, 0.2]}}},
+        "scene.friction.mu_k",
+        "not all points of the sample are allowed",
+    ),
     ({"n": -8}, "sweep.sample.n", "-8 is not allowed: number of samples of each cell must be at least 2"),
     ({"quantiles": {"first_slip": 0.5}}, "sweep.sample.quantiles.first_slip", "list of values"),
     ({"quantiles": {"first_slip": [0, 1]}}, "sweep.sample.quantiles.first_slip.0", "greater than 0"),

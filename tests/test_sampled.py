@@ -422,7 +422,7 @@ def test_a_sample_that_is_not_allowed_is_told_with_its_probability() -> None:
         load(config(of={"body.mass": {"normal": [1.0, 0.5]}}))
     # Nobody draws what has a probability of 1e-23.
     assert load(config(of={"body.mass": {"normal": [1.0, 0.1]}})).sample is not None
-    with pytest.raises(InputError, match=r"[45]\d\.\d% of the points of the sample are not allowed") as caught:
+    with pytest.raises(InputError, match="not all points of the sample are allowed") as caught:
         load(config(of={"friction.mu_k": {"normal": [0.15, 0.01]}}))
     assert caught.value.path == "scene.friction.mu_k"
 

@@ -199,8 +199,6 @@ def simulate_command(arguments: argparse.Namespace) -> int:
     from ringsweep.runs.simulate import history
 
     result = history(config)
-    if replaced := _other_scene(target, result):
-        logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
     _store(result, target, picture, f"{result.attrs['outcome']}\n{events_in_words(result)}", "history")
     return status_of(result)
 
@@ -261,21 +259,6 @@ def fit_command(arguments: argparse.Namespace) -> None:
     target, picture = _outputs(arguments.output or f"{config.name}-fit.nc", "residual", "fit")
     result = dataset(fitted(config, arguments.data, arguments.vary, arguments.start, arguments.noise))
     _store(result, target, picture, result.attrs["fit_report"], "fit")
-
-
-def _other_scene(target: Path, result: Any) -> str:
-    """What the scene of a run that is there already has other than that of a result; empty if nothing."""
-    import pandas as pd
-
-    from ringsweep.quantities.variables import configuration_of
-    from ringsweep.storage import netcdf
-    from ringsweep.storage.provenance import differences
-
-    if not target.exists():
-        return ""
-    with netcdf.open_dataset(target) as earlier:
-        scenes = (pd.json_normalize(configuration_of(ds)["scene"]).astype(str) for ds in (earlier, result))
-        return differences(*(scene.iloc[0].to_dict() for scene in scenes))
 
 
 def animate_command(arguments: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from typing import Any
 
 from ringsweep.cli.parser import build_parser
-from ringsweep.errors import InputError, escaped, is_coloured, nearest_name, print_error, shortened
+from ringsweep.errors import InputError, escaped, nearest_name, print_error, shortened
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         hint = f"; did you mean --{near}?" if unknown[0].startswith("-") and near else hint
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
-    logging.getLogger().handlers[0].setFormatter(_Formatter(is_coloured(sys.stderr)))
+    logging.getLogger().handlers[0].setFormatter(_Formatter())
     logging.getLogger("ringsweep").setLevel(
         logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
     )
@@ -82,17 +82,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             traceback.print_exception(error)
         _give_up_unwritable_output()
         if library := _importing(error):
-            names = [name for name in os.environ if name.startswith(_PREFIXES.get(library, f"{library.upper()}_"))]
-            about = f"{', '.join(names) or 'its environment variables'}: is one of them wrong?"
-            return _fail(f"{library} cannot be loaded ({error}); see {about}", 2, error)
+            return _fail(f"{library} cannot be loaded ({error}): is one of its environment variables wrong?", 2, error)
         if isinstance(error, OSError) and error.strerror:
             return _fail(": ".join([str(error.filename)] * (error.filename is not None) + [error.strerror]), 1, error)
         return _fail(shortened(f"{type(error).__name__}: {error}", 1500), 1, error)
     return status or 0
-
-
-# Beginnings of the names of the environment variables that a library reads, where they are not its own name.
-_PREFIXES = {"matplotlib": "MPL"}
 
 
 def _importing(error: BaseException) -> str | None:
@@ -184,14 +178,7 @@ def _named_output() -> Iterator[None]:
 
 
 class _Formatter(logging.Formatter):
-    """Log messages with the prefix ``ringsweep:``, which is coloured for warnings on a terminal."""
-
-    def __init__(self, coloured: bool):
-        super().__init__("ringsweep: %(message)s")
-        self.coloured = coloured
+    """Log messages with the prefix ``ringsweep:``, and with control characters escaped."""
 
     def format(self, record: logging.LogRecord) -> str:
-        text = escaped(super().format(record))
-        if self.coloured and record.levelno >= logging.WARNING:
-            return text.replace("ringsweep:", "\033[33mringsweep:\033[0m", 1)
-        return text
+        return escaped(f"ringsweep: {super().format(record)}")

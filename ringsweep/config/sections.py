@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import length_of, quantity, show, spelled
+from ringsweep.quantities.units import quantity, show, spelled
 
 #: Largest number of values on an axis or in a table.
 MAX_LENGTH = 1_000_000
@@ -65,8 +66,10 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
     InputError
         If `given` is no such sequence, has more than `most` values, or one of its values is wrong.
     """
-    if length_of(given) > most:
-        raise InputError(where, f"more than {most} values are too many")
+    many = InputError(where, f"more than {most} values are too many")
+    # The size of an array is known before its values are made.
+    if isinstance(size := getattr(given, "size", 0), int) and size > most:
+        raise many
     given = spelled(given)
     if hasattr(given, "__array__"):
         array = np.asarray(given)
@@ -76,6 +79,9 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
         given = array.tolist()
     if not isinstance(given, Sequence) or isinstance(given, str | bytes):
         raise InputError(where, f"a list of values is expected, got {show(given)}")
+    given = list(islice(given, most + 1))
+    if len(given) > most:
+        raise many
     if not given:
         raise InputError(where, "empty: give at least one value")
     if isinstance(parameter, Choice):

@@ -49,9 +49,6 @@ _LEVEL = Parameter("1", "level of a quantile", lower=0, upper=1, open_lower=True
 #: Numbers that tell when something happens, and that are missing where it does not.
 CENSORED = ("t_separation", "first_slip")
 
-# Points of a sample that are tried one by one, to tell how many are not allowed.
-_TRIED = 1000
-
 
 @dataclass(frozen=True)
 class Factor:
@@ -431,18 +428,5 @@ def _check_points(sample: Sample, scene: Scene, axes: Axes) -> None:
     try:
         check_consistency(scene, found)
     except InputError as error:
-        error.problem += f": {_share_refused(sample, scene, axes)} of the points of the sample are not allowed"
-        error.problem += " (`over` ties one number to another)"
+        error.problem += ": not all points of the sample are allowed (`over` ties one number to another)"
         raise
-
-
-def _share_refused(sample: Sample, scene: Scene, axes: Axes) -> str:
-    """Share of the points that the model refuses, of the first ones."""
-    shares = sample.shares[:_TRIED]
-    refused = 0
-    for row in shares:
-        try:
-            check_consistency(scene, sample.axes(scene, axes, row[None]))
-        except InputError:
-            refused += 1
-    return f"{refused / len(shares):.1%}" if refused else "some"

@@ -6,7 +6,6 @@ import contextlib
 import math
 import re
 import reprlib
-import sys
 from functools import cache, lru_cache
 from numbers import Real
 from typing import Any
@@ -112,19 +111,6 @@ def spelled(value: Any) -> Any:
         return [text(part) for part in number] if isinstance(number, list) else f"{number} {unit or 'dimensionless'}"
 
     return text(magnitude.tolist() if hasattr(magnitude, "tolist") else magnitude)
-
-
-def length_of(value: Any) -> int:
-    """Number of values in a sequence or an array; 1 for anything else."""
-    if hasattr(value, "shape"):
-        return math.prod(value.shape)
-    try:
-        return len(value)
-    except TypeError:
-        return 1
-    except OverflowError:
-        # A range that is longer than any sequence may be.
-        return sys.maxsize
 
 
 @lru_cache(maxsize=256)
