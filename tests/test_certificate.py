@@ -129,7 +129,7 @@ class TestLaunch:
 
     @staticmethod
     def bristles(batch):
-        _, state = modes.initial_state(take(batch, 0))
+        _, state, _, _ = modes.begin(take(batch, 0))
         return state[2:]
 
     LUGRE: ClassVar = {"friction.sigma0": 1e3, "friction.v_s": 1e-3, "drive.amplitude": 0.3}
@@ -154,7 +154,7 @@ class TestLaunch:
         """A power law with an exponent below 2 begins with infinite acceleration."""
         for exponent, law in ((3.0, "stiction"), (1.5, "stiction")):
             scene = take(cells({"drive.amplitude": 0.3, "drive.exponent": exponent}, law=law, drive="power"), 0)
-            _, (_, v) = modes.initial_state(scene)
+            _, (_, v), _, _ = modes.begin(scene)
             assert (v < 0.0) == (exponent < 2.0)
 
     def test_body_lags_from_the_first_instant_under_infinite_initial_acceleration(self, cells):
@@ -209,8 +209,7 @@ class TestLaw:
     def test_mode_with_a_wrong_segment_is_a_violation(self, cells, law):
         """The audit takes the segment under the contact from the surface, not from the mode."""
         scene = take(self.scene(cells, law), 0)
-        t, y = modes.initial_state(scene)
-        _, mode = modes.initial_mode(scene, t, y)
+        _, y, _, mode = modes.begin(scene)
         forcing = drives.turn(scene.drive, 0.0)
 
         def violation(mode):

@@ -26,8 +26,8 @@ from ringsweep.solvers.variation import at_event
 # A run ends after this many consecutive steps and events at one instant.
 _MOST_STALLED = 400
 
-# By kind of cells: number of series in the table, of components of a state, and row of the first guard.
-_SHAPES: dict[Any, tuple[int, int, int]] = {}
+# By kind of cells: number of series in the table, and row of the first guard.
+_SHAPES: dict[Any, tuple[int, int]] = {}
 
 #: A run is given up if, at the pace of so many steps, it would exceed its largest number of steps.
 PATIENCE = 1_000_000
@@ -330,9 +330,7 @@ def integrate(batch, tolerances, max_steps, results, history):
     """
     cells = Cells(batch)
     if cells.layout not in _SHAPES:
-        sample = take(batch, 0)
-        rows, first_guard = series.table_shape(sample)
-        _SHAPES[cells.layout] = rows, len(modes.initial_state(sample)[1]), first_guard
+        _SHAPES[cells.layout] = series.table_shape(take(batch, 0))
     count: int = _integrate(cells, tolerances, max_steps, results, history, scratch_for(*_SHAPES[cells.layout]))
     return count
 
@@ -350,9 +348,8 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
     for i in range(len(steps)):
         scene = take(batch, i)
         drives.new_course(scratch.course)
-        t, y = modes.initial_state(scene)
+        t, y, status, mode = modes.begin(scene)
         now = Instant(t, 0.0)
-        status, mode = modes.initial_mode(scene, now, y)
         begun = _begin(family(scene.law), scene, mode, now, y, tolerances, c)
         record = recorder.lend(scene, begun, take(rows, i))
         record = recorder.after_event(scene, record, mode, mode, t)

@@ -15,8 +15,9 @@ from ringsweep.physics import drives
 #: The second run of a certificate has a tolerance that is looser by this factor.
 FACTOR = 30.0
 
-# Parts into which an implicit step is divided to look for roots of the guards, and largest number of guards.
-INSTANTS, MOST_GUARDS = 4, 6
+# Parts into which an implicit step is divided to look for roots of the guards, and largest numbers of guards and of
+# components of a state.
+INSTANTS, MOST_GUARDS, MOST_COMPONENTS = 4, 6, 8
 
 
 class Scratch(NamedTuple):
@@ -30,7 +31,7 @@ class Scratch(NamedTuple):
         For the isolation of roots.
     course : ndarray of shape ``COURSE_SHAPE``
         Series of the drive, see :func:`ringsweep.physics.drives.follow`.
-    bends : ndarray of shape ``(2, 3, components)``
+    bends : ndarray of shape ``(2, 3, MOST_COMPONENTS)``
         ``bends[0]`` holds what :func:`ringsweep.solvers.rosenbrock.dense` needs of the last implicit step.
     samples : ndarray of shape ``(MOST_GUARDS, INSTANTS + 1)``
         Guards at instants of an implicit step.
@@ -77,15 +78,15 @@ def lent(scratch):
     return Scratch(borrowed(c), borrowed(work), borrowed(course), borrowed(bends), borrowed(samples), first_guard)
 
 
-def scratch_for(rows: int, components: int, first_guard: int) -> Scratch:
-    """Scratch for a table of so many series and for states of so many components."""
+def scratch_for(rows: int, first_guard: int) -> Scratch:
+    """Scratch for a table of so many series."""
     # NumPy's functions that make arrays would have to be compiled into each kernel.
     return Scratch(
         np.zeros((rows, COLUMNS)),
         np.empty((STACK, COLUMNS)),
         np.empty(drives.COURSE_SHAPE),
         # A component that no step has changed must not be read as if one had.
-        np.zeros((2, 3, components)),
+        np.zeros((2, 3, MOST_COMPONENTS)),
         np.empty((MOST_GUARDS, INSTANTS + 1)),
         first_guard,
     )

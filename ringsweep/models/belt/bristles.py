@@ -90,16 +90,10 @@ class Mode(NamedTuple):
     region: int
 
 
-@modes.initial_state.implements(BristleBelt)
-def _initial_state(scene):
-    z = _deflection_at_start(scene)
+@modes.begin.implements(BristleBelt)
+def _begin_modes(scene):
+    t, x, z = drives.beginning(scene.drive), scene.initial_x, _deflection_at_start(scene)
     v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
-    return drives.beginning(scene.drive), (scene.initial_x, v, z)
-
-
-@modes.initial_mode.implements(BristleBelt)
-def _initial_mode(scene, t, y):
-    x, v, z = y
     sign = 1 if v > 0.0 else -1
     _, _, _, K, _, _ = contact(scene, v, z, 1.0, BAND)
     forcing = drives.turn(scene.drive, t)
@@ -116,7 +110,7 @@ def _initial_mode(scene, t, y):
         opens = load <= 0.0
     else:
         opens = load < 0.0
-    return (SEPARATED_1 if ring.if_load_varies(scene.body, opens, False) else RUNNING), mode
+    return t, (x, v, z), (SEPARATED_1 if ring.if_load_varies(scene.body, opens, False) else RUNNING), mode
 
 
 @modes.switch.implements(BristleBelt)

@@ -24,6 +24,7 @@ from ringsweep.models.belt.force import (
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
 from ringsweep.models.sliding import expand_bounds, speed_in
+from ringsweep.numerics.clock import Instant
 from ringsweep.numerics.series import INVERSE, ORDER, crossings, differentiate, slope, step_within, value, variation
 from ringsweep.numerics.terms import (
     FACTOR_ROWS,
@@ -78,11 +79,6 @@ def _after_first_step(mode):
     return Mode(mode.sign, mode.region, -1)
 
 
-@modes.initial_state.implements(belt.Belt)
-def _initial_state(scene):
-    return drives.beginning(scene.drive), (scene.initial_x, drives.velocity_at_beginning(scene.drive, scene.initial_v))
-
-
 @modes.in_space.implements(belt.Belt)
 def _in_space(scene, t, y):
     forcing = drives.turn(scene.drive, t)
@@ -94,17 +90,19 @@ def _table_shape(scene):
     return FAST + 1, ring.if_load_varies(scene.body, NORMAL, SLOW)
 
 
-@modes.initial_mode.implements(belt.Belt)
-def _initial_mode(scene, t, y):
-    x, v = y
+@modes.begin.implements(belt.Belt)
+def _begin(scene):
+    t, x = drives.beginning(scene.drive), scene.initial_x
+    v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
+    status, mode = RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
     if ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
-        return SEPARATED_1, Mode(0, KINETIC, -1)
-    if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
-        return RUNNING, _mode_at_rest(scene, t, x)
-    if v == 0.0:
+        status, mode = SEPARATED_1, Mode(0, KINETIC, -1)
+    elif holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
+        mode = _mode_at_rest(scene, Instant(t, 0.0), x)
+    elif v == 0.0:
         pull = stuck_pull(scene, x, v, drives.turn(scene.drive, t))
-        return RUNNING, Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
-    return RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
+        mode = Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
+    return t, (x, v), status, mode
 
 
 @inlined

@@ -17,8 +17,8 @@ from ringsweep.models.interface.status import BROKEN
 
 
 @hook
-def initial_state(scene):
-    """Time and state at the beginning of a run.
+def begin(scene):
+    """How a run begins.
 
     Parameters
     ----------
@@ -28,29 +28,9 @@ def initial_state(scene):
     Returns
     -------
     tuple
-        ``(t, state)``: time in s, and a tuple of floats. The time is
-        :func:`ringsweep.physics.drives.beginning`: just after 0 where the drive is singular at 0.
-    """
-
-
-@hook
-def initial_mode(scene, t, y):
-    """Status and mode at the beginning of a run.
-
-    Parameters
-    ----------
-    scene : NamedTuple
-        One cell.
-    t : Instant
-        Time, s.
-    y : tuple of float
-        State at time `t`.
-
-    Returns
-    -------
-    tuple
-        ``(status, mode)``: a constant of :mod:`ringsweep.models.interface.status`, and the mode. A run may end at its
-        launch.
+        ``(t, state, status, mode)``: time, s, :func:`ringsweep.physics.drives.beginning`, which is just after 0 where
+        the drive is singular at 0; a tuple of floats; a constant of :mod:`ringsweep.models.interface.status`, since a
+        run may end at its launch; and the mode.
     """
 
 
@@ -178,4 +158,4 @@ def in_space(scene, t, y):
 
 
 #: Functions without a default.
-MEMBERS = (initial_state, initial_mode, switch, in_space)
+MEMBERS = (begin, switch, in_space)

@@ -111,17 +111,13 @@ class Mode(NamedTuple):
     place_2: tuple[int, int]
 
 
-@modes.initial_state.implements(BristleRing)
-def _initial_state(scene):
+@modes.begin.implements(BristleRing)
+def _begin(scene):
     t = drives.beginning(scene.drive)
+    rho = scene.initial_phi - drives.turn(scene.drive, t)[0]
     v = drives.velocity_at_beginning(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
     z_1, z_2 = _initial_deflections(scene)
-    return t, (scene.initial_phi - drives.turn(scene.drive, t)[0], v, z_1, z_2)
-
-
-@modes.initial_mode.implements(BristleRing)
-def _initial_mode(scene, t, y):
-    rho, v, z_1, z_2 = y
+    y = rho, v, z_1, z_2
     place_1, place_2 = places_at(scene, rho)
     sign = 1 if v > 0.0 else -1
     if v == 0.0:
@@ -132,7 +128,7 @@ def _initial_mode(scene, t, y):
     mode = Mode(sign, BAND, place_1, place_2)
     if not _region_guard(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0:
         mode = Mode(sign, KINETIC, place_1, place_2)
-    return _after_jump(scene, mode, t, y), mode
+    return t, y, _after_jump(scene, mode, t, y), mode
 
 
 @inlined

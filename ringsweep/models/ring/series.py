@@ -130,28 +130,12 @@ with_slip, with_places = replacing("sign", "region", "entry_guard"), replacing("
 with_contacts = replacing("contacts")
 
 
-@modes.initial_state.implements(ring.Ring)
-def _initial_state(scene):
+@modes.begin.implements(ring.Ring)
+def _begin(scene):
     t, phi, launch = drives.beginning(scene.drive), scene.initial_phi, ring.launch_velocity(scene)
-    return t, (phi, _sliding_at_start(scene.drive, scene, t, phi, launch))
-
-
-@hook(optional=True)
-def _sliding_at_start(drive, scene, t, phi, launch):
-    """Sliding velocity at the first instant of a run that is launched at `launch`, rad/s; m/s."""
-    return drives.velocity_at_beginning(drive, launch) * scene.body.radius
-
-
-@_sliding_at_start.implements(drives.Power)
-def _sliding_at_start_of_power(drive, scene, t, phi, launch):
-    v = drives.velocity_at_beginning(drive, launch) * scene.body.radius
-    if leaves_behind(drive, scene, t, v):
-        theta, _, _ = drives.turn(drive, t)
-        status, mode = _mode_at_rest(scene, _held_at(scene, phi - theta), Instant(t, 0.0), phi, 0)
-        # A body that is wedged between its contacts is taken along.
-        if status == RUNNING and mode.sign == 0:
-            return 0.0
-    return v
+    v = drives.velocity_at_beginning(scene.drive, launch) * scene.body.radius
+    status, mode, v = mode_at(scene, Instant(t, 0.0), phi, v)
+    return t, (phi, v), status, mode
 
 
 @hook(optional=True)
@@ -178,18 +162,18 @@ def _table_shape(scene):
     return FAST + 1, DETERMINANT
 
 
-@modes.initial_mode.implements(ring.Ring)
-def _initial_mode(scene, t, y):
-    phi, v = y
+@inlined
+def mode_at(scene, t, phi, v):
+    """Status, mode and sliding velocity of a body on closed contacts that has the sliding velocity `v`."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     held = _held_at(scene, phi - theta)
-    if v == 0.0 and stiction_band(scene.law) == 0.0:
-        return _mode_at_rest(scene, held, t, phi, 0)
-    if leaves_behind(scene.drive, scene, t, v):
-        # Such a ring may push the body off a contact, or jam it.
+    if stiction_band(scene.law) == 0.0 and (v == 0.0 or leaves_behind(scene.drive, scene, t, v)):
+        # A ring that leaves a body behind may push it off a contact, jam it, or wedge it and take it along.
         status, mode = _mode_at_rest(scene, held, t, phi, 0)
-        if status != RUNNING:
-            return status, mode
+        if v == 0.0 or status != RUNNING:
+            return status, mode, v
+        if mode.sign == 0:
+            return status, mode, 0.0
     sign = 1 if v > 0.0 else -1
     region, entry_guard = region_at(scene.law, abs(v)), -1
     if v == 0.0:
@@ -197,7 +181,7 @@ def _initial_mode(scene, t, y):
         epsilon, _ = ring.acceleration(scene.body, 0.0, 0.0, (sin(phi), cos(phi), ring_omega))
         sign, entry_guard = (1 if epsilon >= ring_epsilon else -1), SLOW
     mode = _slipping(scene, held, phi - theta, (sign, region, entry_guard))
-    return _status_at_start(scene.drive, scene, mode, t, y), mode
+    return _status_at_start(scene.drive, scene, mode, t, (phi, v)), mode, v
 
 
 @inlined

@@ -53,6 +53,7 @@ from ringsweep.models.ring.series import (
     SLOW,
     Mode,
     leaves_behind,
+    mode_at,
     slip_after,
     with_contacts,
     with_slip,
@@ -172,13 +173,6 @@ def _after_closed(scene, t, found, zeros, is_new):
     return _opened(scene, t, y, mode, which, zeros, lost)
 
 
-@modes.initial_state.implements(ImpactRing)
-def _initial_state(scene):
-    t, (phi, v) = modes.initial_state(scene.closed)
-    _, _, state = _start(scene, Instant(t, 0.0), phi, v)
-    return t, state
-
-
 @inlined
 def _taken_along(scene, t, wedged):
     """Status, mode and state of a body that was at rest and is wedged on one contact as the ring jerks.
@@ -196,29 +190,19 @@ def _taken_along(scene, t, wedged):
     return status, with_zeros(mode, (min(contacts.zeros_1, 1), min(contacts.zeros_2, 1))), state
 
 
-@inlined
-def _closed(scene, t, psi, v, turned, event):
-    """Status, mode and state of a body all of whose contacts touch, if none opens."""
-    status, mode = modes.initial_mode(ring_of(scene, turned), t, (psi, v))
-    return status, with_contacts(mode, Contacts(NONE, turned, 0, 0, event)), state_when_closed(psi, v, turned)
-
-
-@inlined
-def _start(scene, t, phi, v):
-    found = _closed(scene, t, phi, v, 0, Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, parts(t)[0], 0))
-    if leaves_behind(scene.drive, scene.closed, t, v):
-        wedged = _after_closed(scene, t, (*found[:2], state_when_closed(phi, 0.0, 0)), 2, False)
+@modes.begin.implements(ImpactRing)
+def _begin(scene):
+    t, (phi, v), status, mode = modes.begin(scene.closed)
+    now = Instant(t, 0.0)
+    event = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, parts(now)[0], 0)
+    mode = with_contacts(mode, Contacts(NONE, 0, 0, 0, event))
+    found = status, mode, state_when_closed(phi, v, 0)
+    if leaves_behind(scene.drive, scene.closed, now, v):
+        wedged = _after_closed(scene, now, (status, mode, state_when_closed(phi, 0.0, 0)), 2, False)
         # A body that is wedged on one contact is taken along.
-        if wedged[0] == RUNNING and wedged[1].sign == 0:
-            return _taken_along(scene, t, wedged)
-    return _after_closed(scene, t, found, 2, False)
-
-
-@modes.initial_mode.implements(ImpactRing)
-def _initial_mode(scene, t, y):
-    _, (phi, v) = modes.initial_state(scene.closed)
-    status, mode, _ = _start(scene, t, phi, v)
-    return status, mode
+        found = _taken_along(scene, now, wedged) if wedged[0] == RUNNING and wedged[1].sign == 0 else found
+    status, mode, y = _after_closed(scene, now, found, 2, False)
+    return t, y, status, mode
 
 
 @modes.switch.implements(ImpactRing)
@@ -632,7 +616,9 @@ def _next(scene, t, motion, mode, impact, event):
 @inlined
 def _close(scene, t, psi, v, turned, event):
     """Status, mode and state after all contacts have closed."""
-    return _after_closed(scene, t, _closed(scene, t, psi, v, turned, event), 2, True)
+    status, mode, v = mode_at(ring_of(scene, turned), t, psi, v)
+    mode = with_contacts(mode, Contacts(NONE, turned, 0, 0, event))
+    return _after_closed(scene, t, (status, mode, state_when_closed(psi, v, turned)), 2, True)
 
 
 @modes.status_when_stalled.implements(ImpactRing)
