@@ -13,7 +13,6 @@ import numpy as np
 
 from ringsweep.compile import inlined, take
 from ringsweep.models.interface import audit
-from ringsweep.models.ring import creep
 from ringsweep.models.ring.bristles import slip_of
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.record import Outcome
@@ -122,14 +121,9 @@ def least_rates(batch):
     return {"rad s-1": np.maximum(np.minimum(1.0, swing), swing / 64.0)}
 
 
-@audit.is_reaction.implements(ring.Ring)
+@audit.is_reaction.implements(ring.Ring, ring.BristleRing)
 def _is_reaction(scene, guard):
     return guard in (NORMAL_1, NORMAL_2)
-
-
-@audit.is_reaction.implements(ring.BristleRing)
-def _is_reaction_on_bristles(scene, guard):
-    return guard in (creep.NORMAL_1, creep.NORMAL_2)
 
 
 @audit.undecided.implements(ring.Ring, ring.BristleRing)

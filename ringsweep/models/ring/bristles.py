@@ -8,28 +8,32 @@ bristles are deflected as in steady sliding at the launch velocity.
 
 from __future__ import annotations
 
-from math import cos, isnan, sin, sqrt
-from typing import NamedTuple
+from math import cos, sin, sqrt
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
-from ringsweep.models.ring.contacts import (
-    coefficients_under,
-    places_after_edge,
-    places_at,
-    places_beyond,
+from ringsweep.models.ring.contacts import coefficients_under, places_after_edge
+from ringsweep.models.ring.series import (
+    DETERMINANT,
+    FAST,
+    NORMAL_1,
+    NORMAL_2,
+    SLOW,
+    after_jump,
+    friction_and_motion,
+    held_at,
+    is_jamming,
+    lost_in_slip,
+    slipping,
+    with_places,
+    with_slip,
 )
-from ringsweep.models.ring.creep import DETERMINANT, FAST, NORMAL_1, NORMAL_2, SLOW
-from ringsweep.models.ring.series import NEARLY_JAMMED, loads_in_slip, lost_in_slip
-from ringsweep.models.sliding import ENDS, rate_at_rest
+from ringsweep.models.sliding import rate_at_rest
 from ringsweep.models.slip import Bundle, Slip, region_guards, slip
-from ringsweep.numerics.functions import (
-    select,
-    sine_cosine_from,
-)
-from ringsweep.physics import contact, drives, ring
+from ringsweep.numerics.functions import select, sine_cosine_from
+from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.physics.ring import BristleRing
@@ -92,25 +96,6 @@ def _slip_in_space(scene, y, v, forcing, angle):
     return slip_of(scene, under, (*angle, y[1]), (rho, v, z_1, z_2), sign, BAND), stuck
 
 
-class Mode(NamedTuple):
-    """Mode of the ring with bristles.
-
-    Attributes
-    ----------
-    sign : int
-        Sign of the sliding velocity.
-    region : int
-        BAND if the body counts as stuck, else KINETIC.
-    place_1, place_2 : tuple of int
-        Segment and turn of each contact.
-    """
-
-    sign: int
-    region: int
-    place_1: tuple[int, int]
-    place_2: tuple[int, int]
-
-
 @modes.begin.implements(BristleRing)
 def _begin(scene):
     t = drives.beginning(scene.drive)
@@ -118,61 +103,43 @@ def _begin(scene):
     v = drives.velocity_at_beginning(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
     z_1, z_2 = _initial_deflections(scene)
     y = rho, v, z_1, z_2
-    place_1, place_2 = places_at(scene, rho)
-    sign = 1 if v > 0.0 else -1
+    mode = with_slip(held_at(scene, rho), 1 if v > 0.0 else -1, BAND, -1)
     if v == 0.0:
-        now = sliding_at(scene, Mode(sign, BAND, place_1, place_2), t, y)
-        epsilon, _ = ring.acceleration(scene.body, *now.K, now.motion)
-        sign = 1 if epsilon > drives.turn(scene.drive, t)[2] else -1
-    place_1, place_2 = places_beyond(scene, place_1, place_2, rho, sign)
-    mode = Mode(sign, BAND, place_1, place_2)
-    if not _region_guard(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0:
-        mode = Mode(sign, KINETIC, place_1, place_2)
-    return t, y, _after_jump(scene, mode, t, y), mode
+        K, motion = friction_and_motion(scene, mode, t, y)
+        epsilon, _ = ring.acceleration(scene.body, *K, motion)
+        mode = with_slip(mode, 1 if epsilon > drives.turn(scene.drive, t)[2] else -1, BAND, -1)
+    mode = slipping(scene, mode, rho, (mode.sign, BAND, -1))
+    if not _region_guard(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), BAND) > 0.0:
+        mode = with_slip(mode, mode.sign, KINETIC, -1)
+    return t, y, after_jump(scene, mode, t, y), mode
 
 
-@inlined
-def sliding_at(scene, mode, t, y):
-    """The :class:`Slip` of a state of a mode."""
+@friction_and_motion.implements(BristleRing)
+def _friction_and_motion(scene, mode, t, y):
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     phi, omega = y[0] + theta, ring.angular_velocity(scene.body, y[1], ring_omega)
     under = coefficients_under(scene, mode)
-    return slip_of(scene, under, (sin(phi), cos(phi), omega), y, float(mode.sign), mode.region)
-
-
-@inlined
-def _after_jump(scene, mode, t, y):
-    """Status after friction may have jumped."""
-    now = sliding_at(scene, mode, t, y)
-    if isnan(now.K[0] + now.K[1] + now.motion[0] + now.motion[2]):
-        return BROKEN
-    return ENDS[contact.sliding(scene.body, *now.K, now.motion)]
+    now = slip_of(scene, under, (sin(phi), cos(phi), omega), y, float(mode.sign), mode.region)
+    return now.K, now.motion
 
 
 @modes.status_when_stalled.implements(BristleRing)
 def _status_when_stalled(scene, mode, t, y):
-    now = sliding_at(scene, mode, t, y)
-    _, determinant = ring.acceleration(scene.body, *now.K, now.motion)
-    return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(scene.body) else JAM
+    return JAM if is_jamming(scene, mode, t, y) else BROKEN
 
 
 @modes.switch.implements(BristleRing)
 def _switch(scene, mode, guard, t, y):
-    rho, _, z_1, z_2 = y
-    sign, place_1, place_2 = mode.sign, mode.place_1, mode.place_2
     if guard == DETERMINANT:
         return JAM, mode, y
     if guard in (NORMAL_1, NORMAL_2):
-        now = sliding_at(scene, mode, t, y)
-        loads = loads_in_slip(scene.body, now.K, now.motion)
-        return lost_in_slip(scene.body, loads, guard == NORMAL_1), mode, y
+        return lost_in_slip(scene, mode, guard == NORMAL_1, t, y), mode, y
     if guard == SLOW:
-        return RUNNING, Mode(-sign, BAND, place_1, place_2), (rho, 0.0, z_1, z_2)
+        return RUNNING, with_slip(mode, -mode.sign, BAND, -1), (y[0], 0.0, y[2], y[3])
     if guard == FAST:
-        return RUNNING, Mode(sign, KINETIC if mode.region == BAND else BAND, place_1, place_2), y
-    place_1, place_2 = places_after_edge(scene, mode, rho)
-    mode = Mode(sign, mode.region, place_1, place_2)
-    return _after_jump(scene, mode, t, y), mode, y
+        return RUNNING, with_slip(mode, mode.sign, KINETIC if mode.region == BAND else BAND, -1), y
+    mode = with_places(mode, *places_after_edge(scene, mode, y[0]))
+    return after_jump(scene, mode, t, y), mode, y
 
 
 @slip.implements(BristleRing)

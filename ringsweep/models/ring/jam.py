@@ -8,18 +8,13 @@ value: they are infinite.
 
 from __future__ import annotations
 
-from math import cos, inf, sin
+from math import inf
 
 from ringsweep.compile import hook, inlined
 from ringsweep.models.interface import modes, recorder
-from ringsweep.models.ring.bristles import sliding_at
-from ringsweep.models.ring.impact.mode import BOTH, FIRST, NONE, frame, ring_of
-from ringsweep.models.ring.impact.pivot import friction
-from ringsweep.models.ring.impact.record import with_base
 from ringsweep.models.ring.record import with_peaks
-from ringsweep.models.ring.series import LEAST_DETERMINANT, NEARLY_JAMMED, friction_at_speed
-from ringsweep.physics import drives, pivot, ring
-from ringsweep.physics.impact import ImpactRing
+from ringsweep.models.ring.series import LEAST_DETERMINANT, NEARLY_JAMMED, friction_and_motion
+from ringsweep.physics import drives, ring
 from ringsweep.physics.ring import BristleRing, Ring
 
 # A reaction does not grow if its product with the determinant, in units of the load and of the determinant without
@@ -31,7 +26,7 @@ _FIRST_STEP, _MOST_STEPS = 1e-7, 30
 
 
 @hook
-def _balance(scene, mode, t, y, v):
+def balance(scene, mode, t, y, v):
     """Determinant and accelerations in slip at the sliding velocity `v`, otherwise in the state `y`.
 
     Returns
@@ -42,45 +37,20 @@ def _balance(scene, mode, t, y, v):
     """
 
 
-@inlined
-def _of_closed(body, K, motion, ring_epsilon):
+@balance.implements(Ring, BristleRing)
+def _balance(scene, mode, t, y, v):
+    body, (K, motion) = scene.body, friction_and_motion(scene, mode, t, (y[0], v, *y[2:]))
     epsilon, determinant = ring.acceleration(body, *K, motion)
     normal_1, normal_2 = ring.reactions(body, *K, motion)
     load = body.mass * (body.gravity + body.radius * motion[2] * motion[2]) + 1e-300
-    share = determinant / ring.free_determinant(body)
-    return share, body.radius * (epsilon - ring_epsilon), 0.0, normal_1 / load, normal_2 / load
-
-
-@_balance.implements(Ring)
-def _balance_of_ring(scene, mode, t, y, v):
-    K_1, K_2, omega = friction_at_speed(scene, mode, t, v)
-    return _of_closed(scene.body, (K_1, K_2), (sin(y[0]), cos(y[0]), omega), drives.turn(scene.drive, t)[2])
-
-
-@_balance.implements(BristleRing)
-def _balance_of_bristles(scene, mode, t, y, v):
-    now = sliding_at(scene, mode, t, (y[0], v, y[2], y[3]))
-    return _of_closed(scene.body, now.K, now.motion, drives.turn(scene.drive, t)[2])
-
-
-@_balance.implements(ImpactRing)
-def _balance_of_pivot(scene, mode, t, y, v):
-    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    f = frame(scene, (y[0], v, *y[2:]), ring_omega)
-    K, _ = friction(scene, mode, v)
-    found = pivot.in_slip(f, K)
-    psi_dd, alpha_dd, normal, _ = found
-    acceleration = pivot.sliding_acceleration(f, found, scene.closed.body.radius * ring_epsilon)
-    load = normal / (f.mass * pivot.size(f))
-    first = mode.contacts.open != FIRST
-    share = pivot.determinant(f, K) / f.inertia
-    return share, acceleration, psi_dd - alpha_dd, load if first else 0.0, 0.0 if first else load
+    sliding = body.radius * (epsilon - drives.turn(scene.drive, t)[2])
+    return determinant / ring.free_determinant(body), sliding, 0.0, normal_1 / load, normal_2 / load
 
 
 @inlined
-def _limit(scene, mode, t, y):
+def limit(scene, mode, t, y):
     """Time to the limit of a jam, s; changes of the sliding velocity and of the gap's angular velocity; reactions."""
-    share, acceleration, tilt, load_1, load_2 = _balance(scene, mode, t, y, y[1])
+    share, acceleration, tilt, load_1, load_2 = balance(scene, mode, t, y, y[1])
     nothing = 0.0, 0.0, 0.0, (0.0, 0.0)
     # Where friction has jumped, a run may end with any determinant below zero.
     if not -LEAST_DETERMINANT <= share <= NEARLY_JAMMED or acceleration == 0.0:
@@ -88,46 +58,28 @@ def _limit(scene, mode, t, y):
     before, share_before = y[1], share
     v = before + _FIRST_STEP * (abs(before) if acceleration > 0.0 else -abs(before))
     for _ in range(_MOST_STEPS):
-        share_now, _, _, _, _ = _balance(scene, mode, t, y, v)
+        share_now, _, _, _, _ = balance(scene, mode, t, y, v)
         if share_now == share_before or share_now == 0.0:
             break
         before, share_before, v = v, share_now, v - share_now * (v - before) / (share_now - share_before)
     change = v - y[1]
     # Friction that does not vary with the speed gives no limit: then a jump has made the determinant small.
-    if not abs(_balance(scene, mode, t, y, v)[0]) <= _NO_GROWTH or not change * acceleration * share >= 0.0:
+    if not abs(balance(scene, mode, t, y, v)[0]) <= _NO_GROWTH or not change * acceleration * share >= 0.0:
         return nothing
     # Simpson's rule for the time that the velocity takes: at its limit the acceleration is infinite.
-    _, halfway, _, _, _ = _balance(scene, mode, t, y, y[1] + 0.5 * change)
+    _, halfway, _, _, _ = balance(scene, mode, t, y, y[1] + 0.5 * change)
     s = change * (1.0 / acceleration + 4.0 / halfway) / 6.0
     normal_1 = inf if abs(load_1 * share) > _NO_GROWTH else 0.0
     normal_2 = inf if abs(load_2 * share) > _NO_GROWTH else 0.0
     return max(s, 0.0), change, tilt / acceleration * change, (normal_1, normal_2)
 
 
-@modes.limit_of_jam.implements(Ring)
-def _limit_of_ring(scene, mode, t, y):
+@modes.limit_of_jam.implements(Ring, BristleRing)
+def _limit_of_jam(scene, mode, t, y):
     if mode.sign == 0:
         return 0.0, y, (0.0, 0.0)
-    s, change, _, normals = _limit(scene, mode, t, y)
-    return s, (y[0], y[1] + change), normals
-
-
-@modes.limit_of_jam.implements(BristleRing)
-def _limit_of_bristles(scene, mode, t, y):
-    s, change, _, normals = _limit(scene, mode, t, y)
-    return s, (y[0], y[1] + change, y[2], y[3]), normals
-
-
-@modes.limit_of_jam.implements(ImpactRing)
-def _limit_of_impact_ring(scene, mode, t, y):
-    contacts = mode.contacts
-    if mode.sign == 0 or contacts.open == BOTH:
-        return 0.0, y, (0.0, 0.0)
-    if contacts.open == NONE:
-        s, (_, v), normals = modes.limit_of_jam(ring_of(scene, contacts.turned), mode, t, (y[0], y[1]))
-        return s, (y[0], v, *y[2:]), normals
-    s, change, tilt, normals = _limit(scene, mode, t, y)
-    return s, (y[0], y[1] + change, y[2], y[3] + tilt, *y[4:]), normals
+    s, change, _, normals = limit(scene, mode, t, y)
+    return s, (y[0], y[1] + change, *y[2:]), normals
 
 
 @recorder.at_jam.implements(Ring, BristleRing)
@@ -139,8 +91,3 @@ def _at_jam(scene, record, normals, velocity):
         max(record.normal_max_1, normals[0]),
         max(record.normal_max_2, normals[1]),
     )
-
-
-@recorder.at_jam.implements(ImpactRing)
-def _at_jam_of_impact_ring(scene, record, normals, velocity):
-    return with_base(record, recorder.at_jam(scene.closed, record.base, normals, velocity))

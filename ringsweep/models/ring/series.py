@@ -157,7 +157,7 @@ def _power_leaves_behind(drive, scene, t, v):
     return stiction_band(scene.law) == 0.0 and _jerked(drive, scene, t, v)
 
 
-@series.table_shape.implements(ring.Ring)
+@series.table_shape.implements(ring.Ring, ring.BristleRing)
 def _table_shape(scene):
     return FAST + 1, DETERMINANT
 
@@ -166,7 +166,7 @@ def _table_shape(scene):
 def mode_at(scene, t, phi, v):
     """Status, mode and sliding velocity of a body on closed contacts that has the sliding velocity `v`."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    held = _held_at(scene, phi - theta)
+    held = held_at(scene, phi - theta)
     if stiction_band(scene.law) == 0.0 and (v == 0.0 or leaves_behind(scene.drive, scene, t, v)):
         # A ring that leaves a body behind may push it off a contact, jam it, or wedge it and take it along.
         status, mode = _mode_at_rest(scene, held, t, phi, 0)
@@ -180,19 +180,19 @@ def mode_at(scene, t, phi, v):
         # Friction is zero here, so that the body slides in the direction in which the other forces accelerate it.
         epsilon, _ = ring.acceleration(scene.body, 0.0, 0.0, (sin(phi), cos(phi), ring_omega))
         sign, entry_guard = (1 if epsilon >= ring_epsilon else -1), SLOW
-    mode = _slipping(scene, held, phi - theta, (sign, region, entry_guard))
+    mode = slipping(scene, held, phi - theta, (sign, region, entry_guard))
     return _status_at_start(scene.drive, scene, mode, t, (phi, v)), mode, v
 
 
 @inlined
-def _held_at(scene, rho):
+def held_at(scene, rho):
     """Mode of a body that sticks at the angle `rho` in the ring's frame, rad."""
     place_1, place_2 = places_at(scene, rho)
     return Mode(0, KINETIC, -1, place_1, place_2, ())
 
 
 @inlined
-def _slipping(scene, mode, rho, slip):
+def slipping(scene, mode, rho, slip):
     """Mode of a body that begins to slip; `slip` is the sign, the region of the law, and the entry guard."""
     return with_slip(with_places(mode, *places_beyond(scene, mode.place_1, mode.place_2, rho, slip[0])), *slip)
 
@@ -200,7 +200,7 @@ def _slipping(scene, mode, rho, slip):
 @hook(optional=True)
 def _status_at_start(drive, scene, mode, t, y):
     """Status of a run that begins in slip."""
-    return _after_jump(scene, mode, t, y)
+    return after_jump(scene, mode, t, y)
 
 
 # Speeds at which an end is looked for in the band of a smooth law.
@@ -210,7 +210,7 @@ _SPEEDS = 400
 @_status_at_start.implements(drives.Power)
 def _status_after_jerk(drive, scene, mode, t, y):
     phi, v = y
-    status = _after_jump(scene, mode, t, y)
+    status = after_jump(scene, mode, t, y)
     if status == RUNNING or stiction_band(scene.law) == 0.0 or not _jerked(drive, scene, t, v):
         return status
     # The sliding velocity has grown from 0 to v in no time, and friction with it: a contact may have been lost before
@@ -218,7 +218,7 @@ def _status_after_jerk(drive, scene, mode, t, y):
     for i in range(1, _SPEEDS):
         slower = v * i / _SPEEDS
         there = with_slip(mode, mode.sign, region_at(scene.law, abs(slower)), -1)
-        earlier = _after_jump(scene, there, t, (phi, slower))
+        earlier = after_jump(scene, there, t, (phi, slower))
         if earlier != RUNNING:
             return earlier
     return status
@@ -242,8 +242,8 @@ def _mode_at_rest(scene, mode, t, phi, stick_end):
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     region = region_at(scene.law, 0.0)
     stick = with_slip(mode, 0, KINETIC, -1)
-    forward = _slipping(scene, mode, phi - theta, (1, region, SLOW))
-    backward = _slipping(scene, mode, phi - theta, (-1, region, SLOW))
+    forward = slipping(scene, mode, phi - theta, (1, region, SLOW))
+    backward = slipping(scene, mode, phi - theta, (-1, region, SLOW))
     mu_s1, _, mu_s2, _ = coefficients_under(scene, stick)
     breakaway = _at_breakaway(scene, forward), _at_breakaway(scene, backward)
     problem = *breakaway, (sin(phi), cos(phi), ring_omega), ring_epsilon
@@ -264,26 +264,30 @@ def _mode_at_rest(scene, mode, t, phi, stick_end):
     return ENDS[found], stick
 
 
+@hook
+def friction_and_motion(scene, mode, t, y):
+    """Friction K at each contact in the slip of a mode, and the motion, as :func:`ring.acceleration` takes them."""
+
+
+@friction_and_motion.implements(ring.Ring)
+def _friction_and_motion(scene, mode, t, y):
+    omega = ring.angular_velocity(scene.body, y[1], drives.turn(scene.drive, t)[1])
+    return friction_under(scene, mode, abs(y[1])), (sin(y[0]), cos(y[0]), omega)
+
+
 @inlined
-def _after_jump(scene, mode, t, y):
+def after_jump(scene, mode, t, y):
     """Status in slip after friction may have jumped."""
-    phi, v = y
-    K1, K2, omega = friction_at_speed(scene, mode, t, v)
-    if isnan(phi + omega + K1 + K2):
+    K, motion = friction_and_motion(scene, mode, t, y)
+    if isnan(K[0] + K[1] + motion[0] + motion[2]):
         return BROKEN
-    return ENDS[contact.sliding(scene.body, K1, K2, (sin(phi), cos(phi), omega))]
+    return ENDS[contact.sliding(scene.body, *K, motion)]
 
 
 @inlined
-def friction_at_speed(scene, mode, t, v):
-    """K at each contact, and angular velocity of the body, at the sliding velocity `v`."""
-    K1, K2 = friction_under(scene, mode, abs(v))
-    return K1, K2, ring.angular_velocity(scene.body, v, drives.turn(scene.drive, t)[1])
-
-
-@inlined
-def loads_in_slip(body, K, motion):
+def _loads_in_slip(scene, mode, t, y):
     """Determinant of the balances, both reactions and their scale in slip, from the balances and not from a series."""
+    body, (K, motion) = scene.body, friction_and_motion(scene, mode, t, y)
     epsilon, determinant = ring.acceleration(body, *K, motion)
     normal_1, normal_2 = ring.reactions(body, *K, motion)
     scale = body.mass * (body.gravity + body.radius * (motion[2] * motion[2] + abs(epsilon)))
@@ -291,32 +295,20 @@ def loads_in_slip(body, K, motion):
 
 
 @inlined
-def _loads_at(scene, mode, t, y):
-    """What :func:`loads_in_slip` returns for a state."""
-    K1, K2, omega = friction_at_speed(scene, mode, t, y[1])
-    return loads_in_slip(scene.body, (K1, K2), (sin(y[0]), cos(y[0]), omega))
-
-
-@inlined
-def _is_jamming(scene, mode, t, y):
+def is_jamming(scene, mode, t, y):
     """Whether slip is so near to a jam, where reactions grow without bound, that their signs mean nothing."""
-    if mode.sign == 0:
-        return False
-    determinant, _, _, _ = _loads_at(scene, mode, t, y)
+    determinant, _, _, _ = _loads_in_slip(scene, mode, t, y)
     return not determinant > NEARLY_JAMMED * ring.free_determinant(scene.body)
 
 
 @inlined
-def lost_in_slip(body, loads, first):
-    """Status after the reaction of contact 1 (`first`) or of contact 2 has vanished in slip.
-
-    `loads` is what :func:`loads_in_slip` returned.
-    """
-    determinant, normal_1, normal_2, scale = loads
+def lost_in_slip(scene, mode, first, t, y):
+    """Status after the reaction of contact 1 (`first`) or of contact 2 has vanished in slip."""
+    determinant, normal_1, normal_2, scale = _loads_in_slip(scene, mode, t, y)
     # Near a jam the series of a reaction is inaccurate, and may vanish where the reaction does not.
     if (normal_1 if first else normal_2) > 1e-2 * scale:
-        return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(body) else JAM
-    return _lost(body, (normal_1, normal_2), scale, first)
+        return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(scene.body) else JAM
+    return _lost(scene.body, (normal_1, normal_2), scale, first)
 
 
 @inlined
@@ -328,13 +320,12 @@ def _lost(body, normals, scale, first):
 @inlined
 def _after_zero_reaction(scene, mode, first, t, y):
     """Status after a reaction has vanished, see :func:`lost_in_slip`."""
-    body = scene.body
     if mode.sign != 0:
-        return lost_in_slip(body, _loads_at(scene, mode, t, y), first)
+        return lost_in_slip(scene, mode, first, t, y)
     # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band still
     # hold the body at this instant.
     normals, scale = _loads_as_stick_ends(scene, mode, t, y, first)
-    return _lost(body, normals, scale, first)
+    return _lost(scene.body, normals, scale, first)
 
 
 @inlined
@@ -355,7 +346,7 @@ def _status_when_stalled(scene, mode, t, y):
     # Where friction changes fast with the speed, the determinant does not show the jam: test with static coefficients.
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     _, determinant = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, (0.0, 1.0, 0.0))
-    return JAM if _is_jamming(scene, mode, t, y) or not determinant > 0.0 else BROKEN
+    return JAM if is_jamming(scene, mode, t, y) or not determinant > 0.0 else BROKEN
 
 
 @modes.switch.implements(ring.Ring)
@@ -380,7 +371,7 @@ def _switch(scene, mode, guard, t, y):
     if mode.sign == 0:
         status, mode = _mode_at_rest(scene, mode, t, phi, stick_end)
         return status, mode, (phi, 0.0)
-    return _after_jump(scene, mode, t, (phi, v)), mode, (phi, v)
+    return after_jump(scene, mode, t, (phi, v)), mode, (phi, v)
 
 
 @inlined
