@@ -72,13 +72,6 @@ class Arc(NamedTuple):
     mu_k: Any
 
 
-@inlined
-def wrap(x):
-    """Angle reduced to [0, 2 pi), rad: the paper's psi (Eq. 28)."""
-    y = x - 2.0 * pi * floor(x * (0.5 / pi))
-    return select(y < 2.0 * pi, y, 0.0)
-
-
 def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
     """Surface of a ring with zones. Where zones overlap, the later one in the list holds.
 
@@ -122,23 +115,6 @@ def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
 
 
 # The defaults are those of a uniform surface.
-
-
-@hook(optional=True)
-def segment(surface, angle):
-    """Index of the segment at `angle`, rad, of any number of turns."""
-    return 0
-
-
-@segment.implements(Segments)
-def _segments_segment(surface, angle):
-    x = wrap(angle)
-    # The last segment extends across 0 to the first edge.
-    found = len(surface.edges) - 1
-    for j in range(len(surface.edges)):
-        if surface.edges[j] <= x:
-            found = j
-    return found
 
 
 @hook(optional=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ringsweep.compile import inlined
 from ringsweep.physics import ring
 from ringsweep.physics.friction.velocity import friction_in
-from ringsweep.physics.zones import coefficients, cross_edge, edge_ahead, leave_edge, locate, segment
+from ringsweep.physics.zones import coefficients, cross_edge, edge_ahead, leave_edge, locate
 
 
 @inlined
@@ -50,20 +50,9 @@ def coefficients_under(scene, mode):
 
 
 @inlined
-def zones_under(scene, mode):
-    """Number of the zone under each contact (0: none), in the segments of a mode."""
-    _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
-    _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
-    return zone_1, zone_2
-
-
-@inlined
-def zones_at(scene, rho):
-    """Number of the zone under each contact (0: none), at the angle `rho` in the ring's frame, rad."""
-    offset = ring.contact_offset(scene.body)
-    _, _, zone_1 = coefficients(scene.surface, segment(scene.surface, rho - offset))
-    _, _, zone_2 = coefficients(scene.surface, segment(scene.surface, rho + offset))
-    return zone_1, zone_2
+def zones_of(scene, place_1, place_2):
+    """Number of the zone under each contact (0: none), in these segments."""
+    return coefficients(scene.surface, place_1[0])[2], coefficients(scene.surface, place_2[0])[2]
 
 
 @inlined

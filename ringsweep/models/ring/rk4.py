@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ringsweep.models.inspection import inspection, rates, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
-from ringsweep.models.ring.contacts import zones_at
+from ringsweep.models.ring.contacts import places_at, zones_of
 from ringsweep.models.ring.creep import deflections
 from ringsweep.models.slip import Slip
 from ringsweep.numerics.functions import opposing, sine_cosine, sine_cosine_carried, sine_cosine_near
@@ -55,6 +55,6 @@ def _seen(scene, y, now):
 @constant_step.row.implements(Ring, BristleRing)
 def _row(scene, y, forcing):
     now = constant_step.inspect(scene, y, forcing)
-    normals, places = (now.normal_1, now.normal_2), zones_at(scene, y[0] - forcing[0])
+    normals, places = (now.normal_1, now.normal_2), zones_of(scene, *places_at(scene, y[0] - forcing[0]))
     row = y[0], y[1], now.rates[1], *normals, forcing[1], *places, word_of_mode(scene, now)
     return joined(row, deflections(y))

@@ -26,7 +26,7 @@ from ringsweep.models.ring.contacts import (
     places_after_edge,
     places_at,
     places_beyond,
-    zones_under,
+    zones_of,
 )
 from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, level_at_breakaway, rate_at_rest, speed_in
 from ringsweep.numerics.clock import Instant, parts
@@ -656,7 +656,7 @@ def _extremes(scene, record, mode, c, h, work):
 
 @series.row.implements(ring.Ring)
 def _row(scene, mode, c, t, s):
-    zone_1, zone_2 = zones_under(scene, mode)
+    zone_1, zone_2 = zones_of(scene, mode.place_1, mode.place_2)
     return (
         value(c[PHI], s),
         value(c[OMEGA], s),

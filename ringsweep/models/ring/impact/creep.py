@@ -27,7 +27,7 @@ from ringsweep.models.ring.impact.rows import row_of
 from ringsweep.models.ring.record import sought
 from ringsweep.models.sliding import rate_at_rest
 from ringsweep.physics import drives, pivot, ring
-from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
+from ringsweep.physics.friction.velocity import friction_in, region_bounds
 from ringsweep.physics.impact import ImpactRing, inertia
 
 # Error allowed to a gap, in units of that allowed to the angle: the instant of an impact follows from it.
@@ -83,11 +83,7 @@ def _common(scene, mode, forcing, x):
 @implicit.is_stiff.implements(ImpactRing)
 def _is_stiff(scene, mode, y, linear):
     # A gap that has just opened grows from zero: its first step is a series.
-    if y[2] == 0.0:
-        return False
-    body, (_, acceleration, _, _, _), decay = scene.closed.body, linear[0], -linear[1][1][1]
-    natural_frequency = sqrt(body.gravity / body.radius) + abs(y[1]) / body.radius
-    return decay > 50.0 * natural_frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
+    return y[2] != 0.0 and implicit.is_stiff(scene.closed, mode, y, linear)
 
 
 @implicit.error_scales.implements(ImpactRing)

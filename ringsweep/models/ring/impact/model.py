@@ -72,11 +72,7 @@ class SingleContactImpact(SingleContactRing):
 class RingImpact(SingleContactImpact, Ring):
     """Two balls joined by a rod that fall back on the ring."""
 
-    name = "ring"
-    body_type = Ring.body_type
-    doc = Ring.doc
     absent = Ring.absent | _HIDDEN
-    body: ClassVar[dict[str, Parameter]] = Ring.body
 
     def balls(self, values: Values, body: Any) -> Balls:
         """Shapes of the bodies."""
