@@ -5,14 +5,14 @@ from __future__ import annotations
 from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import inlined
 from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, series
 from ringsweep.numerics.clock import later
 from ringsweep.numerics.series import slope
 from ringsweep.physics import drives
-from ringsweep.physics.friction import Dynamic, SetValued, Smooth
 from ringsweep.solvers import rosenbrock
+from ringsweep.solvers.steps import either
 
 
 class Audit(NamedTuple):
@@ -50,87 +50,45 @@ def is_checked(n):
     return n <= _ALL_CHECKED or (n * 0.6180339887498949) % 1.0 < _CHECKED_SHARE
 
 
-@inlined
-def _audit_after(audit, first, second, energy_before, energy_after, s):
-    """Audit after a step of length `s`.
+def _ends_of_series(family, scene, step, scratch):
+    """Forcing and state at both ends of a step; in an implicit step the state for implicit steps."""
+    after = drives.turn(scene.drive, later(step.now, step.s))
+    return (drives.turn(scene.drive, step.now), step.y), (after, step.y_next)
 
-    `first` and `second` are violation and power of friction at the two instants; the energies are those at both ends.
-    """
-    (violation_1, power_1), (violation_2, power_2) = first, second
-    violation = max(audit.violation, max(violation_1, violation_2))
-    work, change = 0.5 * s * (power_1 + power_2), energy_after - energy_before
-    return Audit(
-        violation if isfinite(work) else inf,
-        audit.unexplained + (change - work),
-        audit.turnover
-        + 0.5 * s * (abs(power_1) + abs(power_2))
-        + abs(change)
-        + _ENERGY_SHARE * (abs(energy_before) + abs(energy_after)),
+
+def _ends_of_implicit(family, scene, step, scratch):
+    before = implicit.forcing(scene, scratch.course, step.now, 0.0)
+    after = implicit.forcing(scene, scratch.course, step.now, step.s)
+    return (before, implicit.to_implicit(scene, before, step.y)), (
+        after,
+        implicit.to_implicit(scene, after, step.y_next),
     )
 
 
-@inlined
-def _audit_series_step(scene, step, c, tolerance, audit):
-    """Audit after a step along the series `c`."""
-    first = _violation_in_series_step(scene, step, c, tolerance, EARLY * step.s)
-    second = _violation_in_series_step(scene, step, c, tolerance, LATE * step.s)
-    energy_before, energy_after = (
-        audit_of_model.energy(scene, drives.turn(scene.drive, step.now), step.y),
-        audit_of_model.energy(scene, drives.turn(scene.drive, later(step.now, step.s)), step.y_next),
-    )
-    return _audit_after(audit, first, second, energy_before, energy_after, step.s)
+def _state_in_series(family, scene, step, scratch, ends, fraction):
+    """Forcing, state and rates at a fraction of a step, from the dense output."""
+    s = fraction * step.s
+    state, rates = series.state_at(scene, scratch.c, s), series.rates_at(scene, scratch.c, s)
+    return drives.turn(scene.drive, later(step.now, s)), state, rates
 
 
-@inlined
-def _violation_in_series_step(scene, step, c, tolerance, s):
-    state, rates, forcing = (
-        series.state_at(scene, c, s),
-        series.rates_at(scene, c, s),
-        drives.turn(scene.drive, later(step.now, s)),
-    )
-    return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
-
-
-@inlined
-def _ends(scene, step, course):
-    """Forcing and state for implicit steps at both ends of a step."""
-    before, after = implicit.forcing(scene, course, step.now, 0.0), implicit.forcing(scene, course, step.now, step.s)
-    x, x_next = implicit.to_implicit(scene, before, step.y), implicit.to_implicit(scene, after, step.y_next)
-    return (before, x), (after, x_next)
-
-
-@inlined
-def _audit_implicit_step(scene, step, scratch, tolerance, audit):
-    """Audit after an implicit step."""
-    (before, x), (after, x_next) = _ends(scene, step, scratch.course)
-    first = _violation_in_implicit_step(scene, step, scratch, (x, x_next), tolerance, EARLY)
-    second = _violation_in_implicit_step(scene, step, scratch, (x, x_next), tolerance, LATE)
-    energy_before, energy_after = (
-        audit_of_model.energy(scene, before, step.y),
-        audit_of_model.energy(scene, after, step.y_next),
-    )
-    return _audit_after(audit, first, second, energy_before, energy_after, step.s)
-
-
-@inlined
-def _violation_in_implicit_step(scene, step, scratch, ends, tolerance, fraction):
-    (x, x_next), bends = ends, scratch.bends[0]
-    forcing = implicit.forcing(scene, scratch.course, step.now, fraction * step.s)
+def _state_in_implicit(family, scene, step, scratch, ends, fraction):
+    (_, x), (_, x_next) = ends
+    forcing, bends = implicit.forcing(scene, scratch.course, step.now, fraction * step.s), scratch.bends[0]
     state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends, fraction))
-    rates = rosenbrock.dense_rates(x, x_next, bends, fraction, step.s)
+    return forcing, state, rosenbrock.dense_rates(x, x_next, bends, fraction, step.s)
+
+
+_ends, _state = either(_ends_of_series, _ends_of_implicit), either(_state_in_series, _state_in_implicit)
+
+
+@inlined
+def _violation(family, scene, step, scratch, ends, tolerance, fraction):
+    forcing, state, rates = _state(family, scene, step, scratch, ends, fraction)
     return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
 
 
 @inlined
-def _fall_rate_in_implicit_step(scene, step, scratch, guard):
-    (before, x), (_, x_next) = _ends(scene, step, scratch.course)
-    late = implicit.forcing(scene, scratch.course, step.now, 0.9 * step.s)
-    state = rosenbrock.dense(x, x_next, scratch.bends[0], 0.9)
-    view = implicit.guards_and_motion(scene, step.mode, implicit.common(scene, step.mode, before, x), late, state)
-    return view[0][guard - scratch.first_guard] / (0.1 * step.s)
-
-
-@hook
 def audit_step(family, scene, step, scratch, tolerance, audit):
     """Audit after a step.
 
@@ -151,45 +109,33 @@ def audit_step(family, scene, step, scratch, tolerance, audit):
     -------
     Audit
     """
+    ends = _ends(family, scene, step, scratch)
+    violation_1, power_1 = _violation(family, scene, step, scratch, ends, tolerance, EARLY)
+    violation_2, power_2 = _violation(family, scene, step, scratch, ends, tolerance, LATE)
+    (forcing, _), (forcing_after, _) = ends
+    before = audit_of_model.energy(scene, forcing, step.y)
+    after = audit_of_model.energy(scene, forcing_after, step.y_next)
+    work, change = 0.5 * step.s * (power_1 + power_2), after - before
+    moved = 0.5 * step.s * (abs(power_1) + abs(power_2)) + abs(change)
+    violation = max(audit.violation, max(violation_1, violation_2))
+    return Audit(
+        violation if isfinite(work) else inf,
+        audit.unexplained + (change - work),
+        audit.turnover + moved + _ENERGY_SHARE * (abs(before) + abs(after)),
+    )
 
 
-@audit_step.implements(SetValued)
-def _audit_by_series(family, scene, step, scratch, tolerance, audit):
-    return _audit_series_step(scene, step, scratch.c, tolerance, audit)
-
-
-@audit_step.implements(Smooth)
-def _audit_by_either(family, scene, step, scratch, tolerance, audit):
-    if step.is_implicit:
-        return _audit_implicit_step(scene, step, scratch, tolerance, audit)
-    return _audit_series_step(scene, step, scratch.c, tolerance, audit)
-
-
-@audit_step.implements(Dynamic)
-def _audit_by_implicit(family, scene, step, scratch, tolerance, audit):
-    return _audit_implicit_step(scene, step, scratch, tolerance, audit)
-
-
-@hook
-def fall_rate(family, scene, step, scratch, guard):
-    """Rate at which a guard falls at the end of a step that it ended, in its unit per second.
-
-    `guard` is the row of the guard. Other arguments are as in :func:`audit_step`.
-    """
-
-
-@fall_rate.implements(SetValued)
-def _fall_rate_by_series(family, scene, step, scratch, guard):
+def _fall_rate_in_series(family, scene, step, scratch, guard):
+    """Rate at which a guard, a row of the table, falls at the end of a step that it ended, in its unit per second."""
     return -slope(scratch.c[guard], step.s)
 
 
-@fall_rate.implements(Smooth)
-def _fall_rate_by_either(family, scene, step, scratch, guard):
-    if step.is_implicit:
-        return _fall_rate_in_implicit_step(scene, step, scratch, guard)
-    return -slope(scratch.c[guard], step.s)
+def _fall_rate_in_implicit(family, scene, step, scratch, guard):
+    (before, x), (_, x_next) = _ends_of_implicit(family, scene, step, scratch)
+    late = implicit.forcing(scene, scratch.course, step.now, 0.9 * step.s)
+    state = rosenbrock.dense(x, x_next, scratch.bends[0], 0.9)
+    view = implicit.guards_and_motion(scene, step.mode, implicit.common(scene, step.mode, before, x), late, state)
+    return view[0][guard - scratch.first_guard] / (0.1 * step.s)
 
 
-@fall_rate.implements(Dynamic)
-def _fall_rate_by_implicit(family, scene, step, scratch, guard):
-    return _fall_rate_in_implicit_step(scene, step, scratch, guard)
+fall_rate = either(_fall_rate_in_series, _fall_rate_in_implicit)

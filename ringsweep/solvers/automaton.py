@@ -19,7 +19,7 @@ from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import StepControl, implicit_step, start_at, start_control
-from ringsweep.solvers.steps import Step, lent, scratch_for
+from ringsweep.solvers.steps import Step, either, lent, scratch_for
 from ringsweep.solvers.taylor import series_step
 from ringsweep.solvers.variation import at_event
 
@@ -192,35 +192,17 @@ def _begin_implicit(family, scene, mode, now, y, tolerances, c):
     return recorder.begin(scene, now.t, implicit.seen(scene, view))
 
 
-@hook
-def _history_row(family, scene, step, c, s, y):
+def _row_of_series(family, scene, step, c, s, y):
     """Row of a time history, the time `s` after the beginning of a step, where the state is `y`."""
-
-
-@_history_row.implements(SetValued)
-def _row_series(family, scene, step, c, s, y):
-    return _row_of_series(scene, step, c, s)
-
-
-@_history_row.implements(Smooth)
-def _row_either(family, scene, step, c, s, y):
-    return _row_of_state(scene, step, s, y) if step.is_implicit else _row_of_series(scene, step, c, s)
-
-
-@_history_row.implements(Dynamic)
-def _row_implicit(family, scene, step, c, s, y):
-    return _row_of_state(scene, step, s, y)
-
-
-@inlined
-def _row_of_series(scene, step, c, s):
     return series.row(scene, step.mode, c, later(step.now, s), s)
 
 
-@inlined
-def _row_of_state(scene, step, s, y):
+def _row_of_state(family, scene, step, c, s, y):
     forcing = drives.turn(scene.drive, later(step.now, s))
     return implicit.row(scene, step.mode, forcing, implicit.to_implicit(scene, forcing, y))
+
+
+_history_row = either(_row_of_series, _row_of_state)
 
 
 @inlined

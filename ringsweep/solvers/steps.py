@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import borrowed, inlined, kernel
+from ringsweep.compile import borrowed, function_from_lines, hook, inlined, kernel
 from ringsweep.numerics.clock import Instant
 from ringsweep.numerics.series import STACK
 from ringsweep.numerics.terms import COLUMNS
 from ringsweep.physics import drives
+from ringsweep.physics.friction import Dynamic, SetValued, Smooth
 
 #: The second run of a certificate has a tolerance that is looser by this factor.
 FACTOR = 30.0
@@ -18,6 +21,21 @@ FACTOR = 30.0
 # Parts into which an implicit step is divided to look for roots of the guards, and largest numbers of guards and of
 # components of a state.
 INSTANTS, MOST_GUARDS, MOST_COMPONENTS = 4, 6, 8
+
+
+def either(of_series: Callable[..., Any], of_implicit: Callable[..., Any]) -> Any:
+    """Make a function ``(family, scene, step, ...)`` that is `of_series` or `of_implicit`, as the step is.
+
+    The family of the friction law decides which of them a kernel contains: set-valued laws take series only, laws with
+    bristles implicit steps only. Both have the same arguments.
+    """
+    found, names = hook(inlined(of_series)), ", ".join(inspect.signature(of_series).parameters)
+    found.implements(SetValued)(of_series)
+    found.implements(Dynamic)(inlined(of_implicit))
+    line = f"return of_implicit({names}) if step.is_implicit else of_series({names})"
+    scope = {"of_series": of_series, "of_implicit": of_implicit}
+    found.implements(Smooth)(function_from_lines(names, [line], scope))
+    return found
 
 
 class Scratch(NamedTuple):
