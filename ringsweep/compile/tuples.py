@@ -83,14 +83,16 @@ def feature(otherwise: str, *, absorb: bool = False) -> Any:
     Parameters
     ----------
     otherwise : str
-        Result where the feature is missing: an expression of the arguments.
+        Result where the feature is missing: an expression of the arguments, and of names of the module.
     absorb : bool
         Whether the formula is inlined whatever its size; see :func:`ringsweep.compile.absorbed`.
     """
 
     def decorate(body: Callable[..., Any]) -> Any:
         names = list(inspect.signature(body).parameters)
-        without = function_from_lines(", ".join(names), [f"return {otherwise}"], {"inf": inf, "nan": nan})
+        without = function_from_lines(
+            ", ".join(names), [f"return {otherwise}"], {"inf": inf, "nan": nan} | body.__globals__
+        )
         found = _stub(body, names, lambda *arguments: (without if type(arguments[0]) is tuple else body)(*arguments))
         specialise(found, lambda *kinds: without if kinds[0] == types.Tuple(()) else body, absorb=absorb)
         return found

@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import inf, isnan, nan, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.compile import absorbed, feature, hook, inlined
 from ringsweep.numerics.functions import floor, negated, select
 from ringsweep.numerics.memory import select_all
 from ringsweep.quantities.flags import CHAOTIC, QUASI_PERIODIC, TRANSIENT
@@ -84,6 +84,24 @@ class Part(NamedTuple):
     squares: Any
 
 
+class Parts(NamedTuple):
+    """Parts of the record of a motion that something excites.
+
+    Attributes
+    ----------
+    sum, squares : float
+        Sums of the swings of all cycles, m, and of their squares.
+    earlier, before, middle : Part
+        After the last three powers of two of cycles: at least half of the record comes after `before`.
+    """
+
+    sum: Any
+    squares: Any
+    earlier: Part
+    before: Part
+    middle: Part
+
+
 class Cycles(NamedTuple):
     """Cycles up to now.
 
@@ -105,10 +123,8 @@ class Cycles(NamedTuple):
     lap : float
         Cycles in a lap, 0 if the motion did not return.
     laps : Laps
-    sum, squares : float
-        Sums of the swings of all cycles, m, and of their squares.
-    earlier, before, middle : Part
-        After the last three powers of two of cycles: at least half of the record comes after `before`.
+    parts : Parts
+        An empty tuple if nothing excites the motion.
     period, share, stops, drift : float
         Duration of the last lap, s, NaN if the motion did not return. Share of stick, stops in a cycle, and mean
         velocity, m/s, of the last lap or of the cycles since the reference.
@@ -128,11 +144,7 @@ class Cycles(NamedTuple):
     most: Any
     lap: Any
     laps: Laps
-    sum: Any
-    squares: Any
-    earlier: Part
-    before: Part
-    middle: Part
+    parts: Any
     period: Any
     share: Any
     stops: Any
@@ -205,12 +217,35 @@ def gap(scene, mark, x, velocity, swing, fast):
 
 
 @inlined
-def begin(first, start):
-    """Cycles at the beginning of a run, which is the mark `start`; the record waits for the time `first`, s."""
-    corner, part = Corner(0.0, start), Part(0.0, start, 0.0, 0.0, 0.0)
-    laps = Laps(0.0, 0.0, 0.0, RETURN, inf, inf, corner, corner)
-    sums = 0.0, 0.0, part, part, part, nan, nan, nan, nan
-    return Cycles(0.0, first, start.x, start.x, start.t, start.x, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, laps, *sums)
+def none_yet(excited, first, start):
+    """Cycles at the beginning of a run, which is the mark `start`; the record waits for the time `first`, s.
+
+    `excited` is an empty tuple if nothing excites the motion.
+    """
+    corner, unknown = Corner(0.0, start), (nan, nan, nan, nan)
+    laps, parts = Laps(0.0, 0.0, 0.0, RETURN, inf, inf, corner, corner), _none_yet(excited, start)
+    x, t = start.x, start.t
+    return Cycles(0.0, first, x, x, t, x, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, laps, parts, *unknown)
+
+
+@feature("()")
+def _none_yet(excited, start):
+    part = Part(0.0, start, 0.0, 0.0, 0.0)
+    return Parts(0.0, 0.0, part, part, part)
+
+
+@feature("()", absorb=True)
+def _with_cycle(parts, count, mark, swing):
+    """Parts after the end of a cycle."""
+    sum_now, squares = parts.sum + swing, parts.squares + swing * swing
+    halves, here = count >= 2.0 * parts.middle.count, Part(count, mark, swing, sum_now, squares)
+    return Parts(
+        sum_now,
+        squares,
+        select_all(halves, parts.before, parts.earlier),
+        select_all(halves, parts.middle, parts.before),
+        select_all(halves, here, parts.middle),
+    )
 
 
 @absorbed
@@ -301,9 +336,6 @@ def closed(scene, c, mark, count, known, swing, fast, cycle):
         c.laps.newer,
     )
     laps = _with_corners(laps, returns & negated(again), again, start, mark)
-    sum_now, squares = c.sum + swing, c.squares + swing * swing
-    halves = count >= 2.0 * c.middle.count
-    here = Part(count, mark, swing, sum_now, squares)
     return Cycles(
         count,
         select(cycle < inf, end_of(scene, cycle, count + 1.0), c.next),
@@ -319,11 +351,7 @@ def closed(scene, c, mark, count, known, swing, fast, cycle):
         most,
         lap,
         laps,
-        sum_now,
-        squares,
-        select_all(halves, c.before, c.earlier),
-        select_all(halves, c.middle, c.before),
-        select_all(halves, here, c.middle),
+        _with_cycle(c.parts, count, mark, swing),
         select(returns, (mark.t - t_from) * lap / cycles, select(keeps, c.period, nan)),
         select(keeps, c.share, (mark.total - total_from) / (mark.t - t_from)),
         select(keeps, c.stops, (mark.slips - slips_from) / cycles),
@@ -377,11 +405,12 @@ def stops_of_laps(c):
 
 
 @inlined
-def parts(c):
+def compared(c):
     """Beginnings of the two parts of the record that are compared; the second is not shorter than the first."""
-    if c.count - c.middle.count < c.middle.count - c.before.count:
-        return c.earlier, c.before
-    return c.before, c.middle
+    earlier, before, middle = c.parts.earlier, c.parts.before, c.parts.middle
+    if c.count - middle.count < middle.count - before.count:
+        return earlier, before
+    return before, middle
 
 
 @inlined
@@ -398,13 +427,13 @@ def without_return(c, forced_by_period, cycle, growth):
     growth : tuple of float
         Largest exponent and its standard error, 1/s; NaN if they are not known.
     """
-    (exponent, error), (begin_1, begin_2) = growth, parts(c)
+    (exponent, error), (begin_1, begin_2), parts = growth, compared(c), c.parts
     first, second = begin_2.count - begin_1.count, c.count - begin_2.count
     if isnan(exponent) or first < _FEWEST:
         return TRANSIENT
-    mean_1, mean_2 = (begin_2.sum - begin_1.sum) / first, (c.sum - begin_2.sum) / second
+    mean_1, mean_2 = (begin_2.sum - begin_1.sum) / first, (parts.sum - begin_2.sum) / second
     scatter_1 = max((begin_2.squares - begin_1.squares) / first - mean_1 * mean_1, 0.0)
-    scatter_2 = max((c.squares - begin_2.squares) / second - mean_2 * mean_2, 0.0)
+    scatter_2 = max((parts.squares - begin_2.squares) / second - mean_2 * mean_2, 0.0)
     allowed = _ERRORS * sqrt(scatter_1 * (1.0 / first + 1.0 / second)) + _SAME_SWING * mean_1
     time_1, time_2 = begin_2.mark.t - begin_1.mark.t, c.last.t - begin_2.mark.t
     stick_1 = (begin_2.mark.total - begin_1.mark.total) / time_1

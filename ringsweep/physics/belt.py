@@ -64,6 +64,10 @@ def _radius(body):
     return 1.0
 
 
+class Excited(NamedTuple):
+    """Scenes in which drive or force may vary in time."""
+
+
 class Belt(NamedTuple):
     """Belt, body, friction law and drive of a cell.
 
@@ -92,6 +96,8 @@ class Belt(NamedTuple):
         motion, whose turns end its cycles.
     place_counts : float
         1 if a force depends on the displacement, else 0: without a spring all places are alike.
+    excited : Excited
+        An empty tuple if neither drive nor force can vary in time.
     asked : NamedTuple
         What the record is asked for beyond the outcomes; an empty tuple for nothing.
     section : NamedTuple
@@ -112,6 +118,7 @@ class Belt(NamedTuple):
     forcing_period: Leaf
     cycle: Leaf
     place_counts: Leaf
+    excited: Any = ()
     asked: Any = ()
     section: Any = ()
     initial_z: Any = ()

@@ -166,6 +166,9 @@ class Belt(Model, Continues):
             "initial_v": sliding,
             "span": values["time.span"],
         }
+        # A section may state a period of its own.
+        if structure.section is not None or not isinstance(forced, drives.Constant):
+            fields["excited"] = belt.Excited()
         if structure.section is not None:
             fields["section"] = section.field(structure.section, SECTION, len(mass))
         fields |= _periods(structure, values, np.broadcast_to(drives.period(forced), mass.shape))

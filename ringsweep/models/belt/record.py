@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined, replacing
+from ringsweep.compile import absorbed, feature, hook, inlined, replacing
 from ringsweep.models import cycles, section, tangent
 from ringsweep.models.belt.force import breakaway_force
 from ringsweep.models.cycles import RETURN, Cycles, Mark
@@ -205,7 +205,7 @@ def begin(scene, t, seen, band, play):
         velocity,
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
-        cycles.begin(_first_time(scene), start),
+        cycles.none_yet(scene.excited, _first_time(scene), start),
         shock.at_launch(acceleration),
         tangent.undisturbed(scene.asked, scene, t),
         (),
@@ -459,14 +459,24 @@ def _settles_to(scene, r, t):
     drift = (r.last.x - c.half_x) / (t - c.half_t) if t > c.half_t else r.last.velocity
     if returns:
         drift = c.drift
-    elif forced and c.count > c.before.count:
-        # The last cycles before the end differ from those before another end.
-        first = c.before.mark
-        share, drift = (c.last.total - first.total) / (c.last.t - first.t), (c.last.x - first.x) / (c.last.t - first.t)
-        stops_per_cycle = (c.last.slips - first.slips) / (c.count - c.before.count)
-        swing = c.swing if repeats else (c.sum - c.before.sum) / (c.count - c.before.count)
+    elif forced:
+        means = share, stops_per_cycle, swing, drift
+        share, stops_per_cycle, swing, drift = _of_last_cycles(c.parts, c, repeats, means)
     words = _words(scene, r, t, (returns, period, share, stops_per_cycle, swing, drift))
     return *words, drift
+
+
+@feature("means")
+def _of_last_cycles(parts, c, repeats, means):
+    """Share, stops, swing and mean velocity of the last half of the cycles; `means` if there are none."""
+    before = parts.before
+    if c.count <= before.count:
+        return means
+    # The last cycles before the end differ from those before another end.
+    cycles_since, first, last = c.count - before.count, before.mark, c.last
+    swing = c.swing if repeats else (parts.sum - before.sum) / cycles_since
+    share, stops = (last.total - first.total) / (last.t - first.t), (last.slips - first.slips) / cycles_since
+    return share, stops, swing, (last.x - first.x) / (last.t - first.t)
 
 
 @inlined
@@ -497,7 +507,7 @@ def _words(scene, r, t, of):
         for_good = not loads
     # A stuck body that moves goes with its belt.
     moves = forced and swing > max(r.play, r.band * scene.cycle)
-    held = REST if not moves else PERIODIC if repeats else _without_return(scene, r)
+    held = REST if not moves else PERIODIC if repeats else _without_return(r.cycles.parts, scene, r)
     still = STEADY if belt_velocity != 0.0 else REST
     rests = max(abs(r.last.velocity), abs(r.last.v_rate) * _pace(scene)) <= RETURN * abs(belt_velocity)
     if not forced and in_stop and rests and belt_velocity != 0.0:
@@ -518,7 +528,7 @@ def _words(scene, r, t, of):
         else:
             steady = abs(r.last.v_rate) * scene.span <= RETURN * abs(r.last.v)
         return SLIDING, still if steady and not forced else TRANSIENT, nan, 0.0, 0.0
-    long_run = PERIODIC if returns else _without_return(scene, r)
+    long_run = PERIODIC if returns else _without_return(r.cycles.parts, scene, r)
     if stops_per_cycle > 0.0 or share > 0.0 or (in_stop and not forced):
         return STICK_SLIP, long_run, period, share, stops_per_cycle
     if scene.place_counts > 0.0 and swing <= _ROUNDING * (r.x_max - r.x_min):
@@ -540,11 +550,11 @@ def _returns_each_time(scene, r):
     return cycles.returns_each_time(scene, r.cycles, scene.cycle < inf, fast, largest, growth)
 
 
-@inlined
-def _without_return(scene, r):
+@feature("TRANSIENT")
+def _without_return(parts, scene, r):
     """What a motion that does not return settles to, as far as two parts of its record and its exponent tell."""
     c = r.cycles
-    begin_1, begin_2 = cycles.parts(c)
+    begin_1, begin_2 = cycles.compared(c)
     first, second = begin_2.count - begin_1.count, c.count - begin_2.count
     if scene.cycle == inf or first < 1.0:
         return TRANSIENT

@@ -80,7 +80,8 @@ def _without_full_turns(scene, x, other):
 def launched(asked, scene, t, seen):
     """Long run at the beginning of a run; an empty tuple if it is not asked for."""
     phi, omega = seen[0], seen[1]
-    started = cycles.begin(cycles.end_of(scene, scene.forcing_period, 1.0), Mark(t, phi, omega, 0.0, 0.0))
+    first, start = cycles.end_of(scene, scene.forcing_period, 1.0), Mark(t, phi, omega, 0.0, 0.0)
+    started = cycles.none_yet(asked, first, start)
     return LongRun(Last(t, phi, omega), phi, phi, started, tangent.undisturbed(scene.asked, scene, t), ())
 
 
