@@ -3,8 +3,6 @@
 import ast
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from types import FunctionType
 
@@ -17,49 +15,9 @@ from numba.core.errors import NumbaError, UnsupportedBytecodeError
 import ringsweep
 from ringsweep.compile import cache, numba_private, readable_compile_errors
 from ringsweep.compile.cache import IN_KERNELS, sources_digest
-from ringsweep.compile.numba_private import AVAILABLE
 from ringsweep.errors import InputError
 
 PACKAGE = Path(ringsweep.__file__).parent
-
-#: A sweep that runs in a process in which the import of one of Numba's private interfaces fails.
-WITHOUT_PRIVATE_INTERFACES = """
-import sys
-import numba
-
-sys.modules["numba._dynfunc"] = None
-
-import ringsweep
-from ringsweep.compile.numba_private import AVAILABLE
-from ringsweep.errors import InputError
-
-assert not AVAILABLE
-found = ringsweep.sweep({scene!r}, {axes!r}, solver="event", jobs=1, progress=False)
-print({{name: found[name].values.tolist() for name in found}})
-"""
-
-
-def test_supported_versions_of_numba_have_the_private_interfaces():
-    assert AVAILABLE
-
-
-@pytest.mark.slow
-def test_outcomes_without_private_interfaces_of_numba_are_equal_but_for_rounding(scene, tmp_path):
-    axes = {"drive.amplitude": [0.5, 2.0]}
-    script = WITHOUT_PRIVATE_INTERFACES.format(scene=scene, axes=axes)
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(PACKAGE.parent)}
-    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    expected = ringsweep.sweep(scene, axes, solver="event", progress=False)
-    found = ast.literal_eval(done.stdout.replace("nan", "None"))
-    assert set(found) == set(expected)
-    for name, values in found.items():
-        # The compiler fuses other products where other functions are inlined. Bounds are differences of two runs.
-        digits = 1e-3 if name.endswith("_error") else 1e-12
-        np.testing.assert_allclose(np.array(values, float), expected[name], rtol=digits, err_msg=name)
-    assert (expected["certified"] == 1).all()
-    assert len(set(expected["regime"].values)) == 2
-    assert not list(tmp_path.rglob("*.nb*")), "without private interfaces no kernel is kept on disk"
 
 
 @pytest.fixture

@@ -1,15 +1,11 @@
-"""Everything that this package uses of Numba's private interfaces, with fallbacks on public ones.
+"""Everything that this package uses of Numba's private interfaces: with them kernels compile in a third of the time.
 
-Without the private interfaces kernels take longer to compile, and each process compiles its own. Results are equal
-within rounding: LLVM inlines other functions, and so fuses other multiplications with additions. So a release of Numba
-in which one of these imports fails costs time, not correctness. A release that changes what lies behind the names may
-fail while it compiles: `pyproject.toml` has an upper bound.
+A release of Numba may change what lies behind the names: `pyproject.toml` has an upper bound.
 """
 
 from __future__ import annotations
 
 import hashlib
-import inspect
 import logging
 import operator
 import pickle
@@ -22,398 +18,382 @@ from time import time
 from types import CodeType
 from typing import Any, ClassVar
 
+import numba
+from llvmlite import binding as llvm
+from numba._dynfunc import make_function
+from numba.core import cgutils, types
+from numba.core.caching import IndexDataCacheFile, NullCache
+from numba.core.codegen import CodeLibrary, JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags, StateDict
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.cpu import CPUContext
+from numba.core.datamodel.models import ArrayModel
+from numba.core.runtime.context import NRTContext
+from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.typing.context import Context
+from numba.core.typing.templates import AbstractTemplate, infer, infer_global
+from numba.core.untyped_passes import InlineClosureLikes, WithLifting
+from numba.extending import intrinsic, register_model
+
 logger = logging.getLogger("ringsweep")
 
-try:
-    import numba
-    from llvmlite import binding as llvm
-    from numba._dynfunc import make_function
-    from numba.core import cgutils, types
-    from numba.core.caching import IndexDataCacheFile, NullCache
-    from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler import CompilerBase, DefaultPassBuilder
-    from numba.core.compiler_machinery import PassManager, register_pass
-    from numba.core.cpu import CPUContext
-    from numba.core.datamodel.models import ArrayModel
-    from numba.core.runtime.context import NRTContext
-    from numba.core.typed_passes import NativeLowering, NopythonRewrites
-    from numba.core.typing.context import Context
-    from numba.core.typing.templates import AbstractTemplate, infer, infer_global
-    from numba.core.untyped_passes import InlineClosureLikes
-    from numba.extending import intrinsic, register_model
-except ImportError:
-    AVAILABLE = False
-else:
-    AVAILABLE = True
+
+# ---- LLVM: each function is linked and optimised once, as a part of its kernel ---------------
 
 
-if AVAILABLE:
-    # ---- LLVM: each function is linked and optimised once, as a part of its kernel ---------------
+class _CalleeLibrary(JITCodeLibrary):
+    """Code of a function that kernels call: its text, until a kernel is made."""
 
-    class _CalleeLibrary(JITCodeLibrary):
-        """Code of a function that kernels call. It is neither optimised nor made into machine code on its own."""
+    def __init__(self, codegen: Any, name: str) -> None:
+        CodeLibrary.__init__(self, codegen, name)
+        self._linking_libraries: list[Any] = []
+        self._text, self._shared_module = "", None
 
-        def _optimize_functions(self, ll_module: Any) -> None:
-            ll_module.data_layout = self._codegen._data_layout
+    def add_ir_module(self, ir_module: Any) -> None:
+        self._text = cgutils.normalize_ir_text(str(ir_module))
 
-        def finalize(self) -> None:
-            self._raise_if_finalized()
-            for library in self._linking_libraries:
-                self._reload_init.update(library._reload_init)
-            self._finalize_dynamic_globals()
-            self._finalized = True
+    def finalize(self) -> None:
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+        self._finalized = True
 
-        def _get_module_for_linking(self) -> Any:
-            # Kernels do not come here, but functions of Numba's own that call a function of the package.
-            if self._shared_module is None:
-                _link_all(self._final_module, self._linking_libraries)
-                super()._get_module_for_linking()
-            return self._shared_module
-
-    class _KernelLibrary(JITCodeLibrary):
-        """Code of a kernel with all functions that it calls."""
-
-        def finalize(self) -> None:
-            module = self._final_module
-            own = {function.name for function in module.functions if not function.is_declaration}
-            _link_all(module, self._linking_libraries)
-            for library in self._linking_libraries:
-                self._reload_init.update(library._reload_init)
-            self._linking_libraries = []
-            # LLVM inlines a function of any size at its only call, and drops arguments without use, if it knows that
-            # there are no calls from elsewhere.
-            for function in module.functions:
-                if function.linkage == llvm.Linkage.linkonce_odr and function.name not in own:
-                    function.linkage = llvm.Linkage.internal
-            super().finalize()
-
-        def _optimize_final_module(self) -> None:
-            # Numba's cheap passes before these serve to remove reference counts, which kernels hardly have.
-            passes, builder = self._codegen._module_pass_manager()
-            passes.run(self._final_module, builder)
-
-    def _link_all(module: Any, libraries: list[Any]) -> None:
-        """Link libraries, and all libraries that they call, into a module: each of them once."""
-        done: set[Any] = set()
-        waiting = list(libraries)
-        while waiting:
-            library = waiting.pop()
-            if library in done:
-                continue
-            done.add(library)
-            if isinstance(library, _CalleeLibrary):
-                part = library._final_module.clone()
-                for function in part.functions:
-                    if function.linkage == llvm.Linkage.external and not function.is_declaration:
-                        function.linkage = llvm.Linkage.linkonce_odr
-                module.link_in(part)
-                waiting.extend(library._linking_libraries)
-            else:
-                module.link_in(library._get_module_for_linking(), preserve=True)
-
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class _KernelLowering(NativeLowering):
-        _name = "kernel_lowering"
-
-        def run_pass(self, state: Any) -> bool:
-            state.library = _KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-            state.library.enable_object_caching()
-            return bool(super().run_pass(state))
-
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class _CalleeLowering(NativeLowering):
-        _name = "callee_lowering"
-
-        def run_pass(self, state: Any) -> bool:
-            state.library = _CalleeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-            state.library.enable_object_caching()
-            state.flags.no_compile = True
-            super().run_pass(state)
-            made, library = state["cr"], state.library
-            # Callers find the function by this object; Python cannot call it.
-            name = make_function(made.fndesc.lookup_module(), made.fndesc.qualname, "", 0, made.env, (library,))
-            state.targetctx.insert_user_function(name, made.fndesc, [library])
-            state.reload_init.extend(library._reload_init)
-            state["cr"] = made._replace(cfunc=name)
-            return True
-
-    # ---- lowering ---------------------------------------------------------------------------------
-
-    class _ReferenceCounts(NRTContext):
-        """Reference counts without the code that takes apart tuples of numbers in search of arrays."""
-
-        def get_meminfos(self, builder: Any, ty: Any, val: Any) -> Any:
-            if not _holds_arrays(self._context.data_model_manager, ty):
-                return []
-            return super().get_meminfos(builder, ty, val)
-
-    @cache
-    def _holds_arrays(models: Any, kind: Any) -> bool:
-        return bool(models[kind].contains_nrt_meminfo())
-
-    class _Target(CPUContext):
-        @cached_property
-        def nrt(self) -> Any:
-            return _ReferenceCounts(self, self.enable_nrt)
-
-        def refresh(self) -> None:
-            # Numba asks for this at each function, and wherever it looks for code that does not exist.
-            contents = id(self._registries)
-            if _refreshed.get(contents) != self._registered():
-                super().refresh()
-                _refreshed[contents] = self._registered()
-
-        def _registered(self) -> int:
-            """Number of the functions, attributes and so on that Numba and its extensions have registered."""
-            registries = [*self._registries, *self.typing_context._registries]
-            return sum(len(part) for one in registries for part in vars(one).values() if isinstance(part, list))
-
-        def get_abi_sizeof(self, ty: Any) -> int:
-            # llvmlite parses a module for each answer, and Numba asks at each variable.
-            name = str(ty)
-            if name not in _sizes:
-                _sizes[name] = super().get_abi_sizeof(ty)
-            return _sizes[name]
-
-    _sizes: dict[str, int] = {}
-
-    # By the id of what contexts share: how much of it is installed.
-    _refreshed: dict[int, int] = {}
-
-    # ---- typing -----------------------------------------------------------------------------------
-
-    # By function and types of the arguments: the function, and its signature.
-    _signatures: dict[Any, Any] = {}
-
-    class _Typing(Context):
-        """Numba's typing with a memory of signatures. For each operation Numba tries dozens of overloads."""
-
-        def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
-            if kws or type(func) is not types.Function:
-                return super().resolve_function_type(func, args, kws)
-            key = id(func), tuple(args)
-            if key not in _signatures:
-                signature = super().resolve_function_type(func, args, kws)
-                if signature is None:
-                    return None
-                # The function is kept, so that no other object gets its id.
-                _signatures[key] = func, signature
-            return _signatures[key][1]
-
-        def resolve_value_type(self, val: Any) -> Any:
-            found = super().resolve_value_type(val)
-            return _Operator(found.templates) if type(found) is types.Function and val in _OPERATORS else found
-
-    # Operators whose signature Numba looks for again when it writes their code.
-    _OPERATORS = {one for name, one in vars(operator).items() if not name.startswith("_")}
-
-    class _Operator(types.Function):
-        """Numba type of an operator, whose signatures are remembered."""
-
-        def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-            key = id(self), tuple(args)
-            if key not in _signatures:
-                _signatures[key] = self, super().get_call_type(context, args, kws)
-            return _signatures[key][1]
-
-    @cache
-    def _typing(context: Any) -> Any:
-        """Numba's context of typing, as :class:`_Typing`. Both share their contents."""
-        found = copy(context)
-        found.__class__ = _Typing
+    def module(self) -> Any:
+        """The code as a new module of LLVM, whose functions another module may define again."""
+        found = llvm.parse_assembly(self._text)
+        for function in found.functions:
+            if function.linkage == llvm.Linkage.external and not function.is_declaration:
+                function.linkage = llvm.Linkage.linkonce_odr
         return found
 
-    def choose_body(function: Callable[..., Any], choose: Callable[..., Any], options: Any) -> None:
-        """Give a function bodies for kernels, like ``numba.extending.overload``.
+    def _get_module_for_linking(self) -> Any:
+        # Kernels do not come here, but functions of Numba's own that call a function of the package.
+        if self._shared_module is None:
+            self._shared_module = self.module()
+            _link_all(self._shared_module, self._linking_libraries)
+        return self._shared_module
 
-        Numba's own decorator compiles a body again for callers with other options, and compares signatures and options
-        in each call.
 
-        Parameters
-        ----------
-        function, choose : callable
-            As in :func:`ringsweep.compile.options.specialise`.
-        options : dict
-            Options of ``numba.njit``.
-        """
-        # By body: its compiler. By types of the arguments: the signature. By types of all parameters: compiled code.
-        compilers: dict[Any, Any] = {}
-        signatures: dict[Any, Any] = {}
-        compiled: dict[Any, Any] = {}
+class _KernelLibrary(JITCodeLibrary):
+    """Code of a kernel with all functions that it calls."""
 
-        class Template(AbstractTemplate):
-            key = function
+    def finalize(self) -> None:
+        module = self._final_module
+        own = {function.name for function in module.functions if not function.is_declaration}
+        _link_all(module, self._linking_libraries)
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+        self._linking_libraries = []
+        # LLVM inlines a function of any size at its only call, and drops arguments without use, if it knows that
+        # there are no calls from elsewhere.
+        for function in module.functions:
+            if function.linkage == llvm.Linkage.linkonce_odr and function.name not in own:
+                function.linkage = llvm.Linkage.internal
+        super().finalize()
 
-            def generic(self, args: Any, kws: Any) -> Any:
-                args = tuple(args)
-                if args not in signatures:
-                    body = None if kws else choose(*args)
-                    if body is None:
-                        return None
-                    if body not in compilers:
-                        compilers[body] = numba.njit(**options)(body)
-                    pysig, parameters = compilers[body].fold_argument_types(args, {})
-                    compilers[body].compile(parameters)
-                    made = compilers[body].overloads[parameters]
-                    compiled[parameters] = made.entry_point
-                    signatures[args] = made.signature.replace(pysig=pysig)
-                return signatures[args]
+    def _optimize_final_module(self) -> None:
+        # Numba's cheap passes before these serve to remove reference counts, which kernels hardly have.
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
 
-            def get_impl_key(self, sig: Any) -> Any:
-                return compiled[sig.args]
 
-        infer(Template)
-        infer_global(function, types.Function(Template))
+def _link_all(module: Any, libraries: list[Any]) -> None:
+    """Link libraries, and all libraries that they call, into a module: each of them once."""
+    done: set[Any] = set()
+    waiting = list(libraries)
+    while waiting:
+        library = waiting.pop()
+        if library in done:
+            continue
+        done.add(library)
+        if isinstance(library, _CalleeLibrary):
+            module.link_in(library.module())
+            waiting.extend(library._linking_libraries)
+        else:
+            module.link_in(library._get_module_for_linking(), preserve=True)
 
-    # ---- passes -----------------------------------------------------------------------------------
 
-    class _Passes(PassManager):
-        """Passes without a record of each of them: it prints the types of all arguments."""
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _KernelLowering(NativeLowering):
+    _name = "kernel_lowering"
 
-        def _runPass(self, index: int, one: Any, state: Any) -> None:
-            one.analysis = self._analysis
-            one.run_initialization(state)
-            one.run_pass(state)
-            one.run_finalizer(state)
+    def run_pass(self, state: Any) -> bool:
+        state.library = _KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
 
-    class _KernelCompiler(CompilerBase):
-        """Numba's passes, without those that kernels do not need. Kernels compile in half the time."""
 
-        lowering: ClassVar[type] = _KernelLowering
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _CalleeLowering(NativeLowering):
+    _name = "callee_lowering"
 
-        def __init__(self, typingctx: Any, *arguments: Any) -> None:
-            super().__init__(_typing(typingctx), *arguments)
-            self.state.targetctx.__class__ = _Target
-            self.state.targetctx.typing_context = self.state.typingctx
+    def run_pass(self, state: Any) -> bool:
+        state.library = _CalleeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        state.flags.no_compile = True
+        super().run_pass(state)
+        made, library = state["cr"], state.library
+        # Callers find the function by this object; Python cannot call it.
+        name = make_function(made.fndesc.lookup_module(), made.fndesc.qualname, "", 0, made.env, (library,))
+        state.targetctx.insert_user_function(name, made.fndesc, [library])
+        state.reload_init.extend(library._reload_init)
+        state["cr"] = made._replace(cfunc=name)
+        return True
 
-        def define_pipelines(self) -> list[Any]:
-            whole = DefaultPassBuilder.define_nopython_pipeline(self.state)
-            passes = _Passes(whole.pipeline_name)
-            for one, why in whole.passes:
-                # The rewrites fuse the loops of operations on whole arrays.
-                if one is not NopythonRewrites and (one is not InlineClosureLikes or self._may_hold_closures()):
-                    passes.add_pass(self.lowering if one is NativeLowering else one, why)
-            passes.finalize()
-            return [passes]
 
-        def _may_hold_closures(self) -> bool:
-            code = self.state.func_id.func.__code__
-            return any(isinstance(constant, CodeType) for constant in code.co_consts) or "reduce" in code.co_names
+# ---- lowering ---------------------------------------------------------------------------------
 
-    class _CalleeCompiler(_KernelCompiler):
-        lowering = _CalleeLowering
 
-    class _Borrowed(types.Array):
-        """Numba type of an array without a reference count."""
+class _ReferenceCounts(NRTContext):
+    """Reference counts without the code that takes apart tuples of numbers in search of arrays."""
 
-        def copy(self, *arguments: Any, **changes: Any) -> Any:
-            return without_count(super().copy(*arguments, **changes))
+    def get_meminfos(self, builder: Any, ty: Any, val: Any) -> Any:
+        if not _holds_arrays(self._context.data_model_manager, ty):
+            return []
+        return super().get_meminfos(builder, ty, val)
 
-    def without_count(array: Any) -> Any:
-        """Numba type of an array that :func:`borrowed` returns."""
-        return _Borrowed(array.dtype, array.ndim, array.layout, readonly=not array.mutable, aligned=array.aligned)
 
-    @register_model(_Borrowed)
-    class _BorrowedModel(ArrayModel):
-        def contains_nrt_meminfo(self) -> bool:
-            return False
+@cache
+def _holds_arrays(models: Any, kind: Any) -> bool:
+    return bool(models[kind].contains_nrt_meminfo())
 
-    @intrinsic
-    def _borrowed(typingctx: Any, array: Any) -> Any:
-        """View of an array without a reference count; valid while the array lives.
 
-        Each call with an array, or with a tuple that holds one, increments and decrements the count. Each of these
-        atomic operations costs more than a coefficient of a series, and the code for them takes time to compile.
-        """
+class _Target(CPUContext):
+    @cached_property
+    def nrt(self) -> Any:
+        return _ReferenceCounts(self, self.enable_nrt)
 
-        def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            view = context.make_array(array)(context, builder, args[0])
-            view.meminfo = cgutils.get_null_value(view.meminfo.type)
-            view.parent = cgutils.get_null_value(view.parent.type)
-            return view._getvalue()
 
-        return without_count(array)(array), build
+# ---- typing -----------------------------------------------------------------------------------
 
-    borrowed: Any = _borrowed
+# By function and types of the arguments: the function, and its signature.
+_signatures: dict[Any, Any] = {}
 
-    # ---- compiled code on disk --------------------------------------------------------------------
 
-    class _NamedFiles(IndexDataCacheFile):
-        """One file for each compiled kernel, whose name is a digest of all that determines the code.
+class _Typing(Context):
+    """Numba's typing with a memory of signatures. For each operation Numba tries dozens of overloads."""
 
-        These are the sources, the version of Numba, and Numba's key: function, types of the arguments, processor and
-        its features. A file begins with a digest of its content, and holds the key too: two types can have one name.
-        """
-
-        def _path(self, key: Any) -> Path:
-            name = hashlib.sha256(repr((self._version, self._index_name, key)).encode()).hexdigest()
-            return Path(self._cache_path, f"{self._index_name.partition('-')[0]}-{self._source_stamp}-{name[:32]}.nbc")
-
-        def save(self, key: Any, data: Any) -> None:
-            body = self._dump((self._index_name, key, data))
-            with self._open_for_write(self._path(key)) as file:
-                file.write(hashlib.sha256(body).digest() + body)
-            for old in Path(self._cache_path).glob("*.nb[ci]"):
-                # Of other sources; another process may remove it at the same time.
-                with suppress(OSError):
-                    if f"-{self._source_stamp}-" not in old.name and time() - old.stat().st_mtime > _KEPT:
-                        old.unlink()
-
-        def load(self, key: Any) -> Any:
-            try:
-                content = self._path(key).read_bytes()
-                body = content[_DIGEST:]
-                if hashlib.sha256(body).digest() != content[:_DIGEST]:
-                    return None
-                *found, data = pickle.loads(body)
-            except (OSError, AttributeError, ImportError):
-                # It is not there, belongs to another user, or names types that this process does not have.
+    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+        if kws or type(func) is not types.Function:
+            return super().resolve_function_type(func, args, kws)
+        key = id(func), tuple(args)
+        if key not in _signatures:
+            signature = super().resolve_function_type(func, args, kws)
+            if signature is None:
                 return None
-            return data if found == [self._index_name, key] else None
+            # The function is kept, so that no other object gets its id.
+            _signatures[key] = func, signature
+        return _signatures[key][1]
 
-    _DIGEST = hashlib.sha256().digest_size
+    def resolve_value_type(self, val: Any) -> Any:
+        found = super().resolve_value_type(val)
+        return _Operator(found.templates) if type(found) is types.Function and val in _OPERATORS else found
 
-    # Seconds for which compiled code of other sources is kept.
-    _KEPT = 86_400.0
 
-    #: Further options of kernels, and of functions that are compiled into kernels.
-    KERNEL_COMPILER: dict[str, Any] = {"pipeline_class": _KernelCompiler}
-    CALLEE_COMPILER: dict[str, Any] = {"pipeline_class": _CalleeCompiler}
+# Operators whose signature Numba looks for again when it writes their code.
+_OPERATORS = {one for name, one in vars(operator).items() if not name.startswith("_")}
 
-else:
-    from numba.extending import overload, register_jitable
 
-    @register_jitable
-    def _itself(array):
-        return array
+class _Operator(types.Function):
+    """Numba type of an operator, whose signatures are remembered."""
 
-    def without_count(array: Any) -> Any:
-        """Numba type of an array that :func:`borrowed` returns."""
-        return array
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        key = id(self), tuple(args)
+        if key not in _signatures:
+            _signatures[key] = self, super().get_call_type(context, args, kws)
+        return _signatures[key][1]
 
-    borrowed = _itself
-    KERNEL_COMPILER = CALLEE_COMPILER = {}
 
-    def choose_body(function: Callable[..., Any], choose: Callable[..., Any], options: Any) -> None:
-        """Give a function bodies for kernels."""
+@cache
+def _typing(context: Any) -> Any:
+    """Numba's context of typing, as :class:`_Typing`. Both share their contents."""
+    found = copy(context)
+    found.__class__ = _Typing
+    return found
 
-        def typed(*kinds):
-            return choose(*kinds)
 
-        # Numba compares this signature with the signatures of the bodies, which have no annotations.
-        plain = [
-            inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-            for name in inspect.signature(function).parameters
-        ]
-        typed.__signature__ = inspect.Signature(plain)  # type: ignore[attr-defined]
-        overload(function, jit_options=options, strict=False)(typed)
+def choose_body(function: Callable[..., Any], choose: Callable[..., Any], options: Any) -> None:
+    """Give a function bodies for kernels, like ``numba.extending.overload``.
+
+    Numba's own decorator compiles a body again for callers with other options, and compares signatures and options
+    in each call.
+
+    Parameters
+    ----------
+    function, choose : callable
+        As in :func:`ringsweep.compile.options.specialise`.
+    options : dict
+        Options of ``numba.njit``.
+    """
+    # By body: its compiler. By types of the arguments: the signature. By types of all parameters: compiled code.
+    compilers: dict[Any, Any] = {}
+    signatures: dict[Any, Any] = {}
+    compiled: dict[Any, Any] = {}
+
+    class Template(AbstractTemplate):
+        key = function
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            args = tuple(args)
+            if args not in signatures:
+                body = None if kws else choose(*args)
+                if body is None:
+                    return None
+                if body not in compilers:
+                    compilers[body] = numba.njit(**options)(body)
+                pysig, parameters = compilers[body].fold_argument_types(args, {})
+                compilers[body].compile(parameters)
+                made = compilers[body].overloads[parameters]
+                compiled[parameters] = made.entry_point
+                signatures[args] = made.signature.replace(pysig=pysig)
+            return signatures[args]
+
+        def get_impl_key(self, sig: Any) -> Any:
+            return compiled[sig.args]
+
+    infer(Template)
+    infer_global(function, types.Function(Template))
+
+
+# ---- passes -----------------------------------------------------------------------------------
+
+
+class _Passes(PassManager):
+    """Passes without a record of each of them: it prints the types of all arguments."""
+
+    def _runPass(self, index: int, one: Any, state: Any) -> None:
+        one.analysis = self._analysis
+        one.run_initialization(state)
+        one.run_pass(state)
+        one.run_finalizer(state)
+
+
+# Kernels have no blocks ``with``, and no loops over whole arrays to fuse.
+_NEEDLESS = (WithLifting, NopythonRewrites), (WithLifting, NopythonRewrites, InlineClosureLikes, InlineOverloads)
+
+_INLINED_BY_NUMBA = {"reduce", "bool"}
+
+
+class _KernelCompiler(CompilerBase):
+    """Numba's passes, without those that kernels do not need. Kernels compile in half the time."""
+
+    lowering: ClassVar[type] = _KernelLowering
+
+    def __init__(self, typingctx: Any, *arguments: Any) -> None:
+        super().__init__(_typing(typingctx), *arguments)
+        self.state.targetctx.__class__ = _Target
+        self.state.targetctx.typing_context = self.state.typingctx
+
+    def define_pipelines(self) -> list[Any]:
+        code = self.state.func_id.func.__code__
+        closures = any(isinstance(constant, CodeType) for constant in code.co_consts)
+        return [self._passes(not closures and _INLINED_BY_NUMBA.isdisjoint(code.co_names))]
+
+    @classmethod
+    @cache
+    def _passes(cls, plain: bool) -> Any:
+        """Numba's passes, without those that are not needed; a `plain` function calls nothing that Numba inlines."""
+        whole = DefaultPassBuilder.define_nopython_pipeline(StateDict(flags=Flags(), func_ir=None))
+        passes = _Passes(whole.pipeline_name)
+        for one, why in whole.passes:
+            if one not in _NEEDLESS[plain]:
+                passes.add_pass(cls.lowering if one is NativeLowering else one, why)
+        passes.finalize()
+        return passes
+
+
+class _CalleeCompiler(_KernelCompiler):
+    lowering = _CalleeLowering
+
+
+class _Borrowed(types.Array):
+    """Numba type of an array without a reference count."""
+
+    def copy(self, *arguments: Any, **changes: Any) -> Any:
+        return without_count(super().copy(*arguments, **changes))
+
+
+def without_count(array: Any) -> Any:
+    """Numba type of an array that :func:`borrowed` returns."""
+    return _Borrowed(array.dtype, array.ndim, array.layout, readonly=not array.mutable, aligned=array.aligned)
+
+
+@register_model(_Borrowed)
+class _BorrowedModel(ArrayModel):
+    def contains_nrt_meminfo(self) -> bool:
+        return False
+
+
+@intrinsic
+def _borrowed(typingctx: Any, array: Any) -> Any:
+    """View of an array without a reference count; valid while the array lives.
+
+    Each call with an array, or with a tuple that holds one, increments and decrements the count. Each of these
+    atomic operations costs more than a coefficient of a series, and the code for them takes time to compile.
+    """
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        view = context.make_array(array)(context, builder, args[0])
+        view.meminfo = cgutils.get_null_value(view.meminfo.type)
+        view.parent = cgutils.get_null_value(view.parent.type)
+        return view._getvalue()
+
+    return without_count(array)(array), build
+
+
+borrowed: Any = _borrowed
+
+# ---- compiled code on disk --------------------------------------------------------------------
+
+
+class _NamedFiles(IndexDataCacheFile):
+    """One file for each compiled kernel, whose name is a digest of all that determines the code.
+
+    These are the sources, the version of Numba, and Numba's key: function, types of the arguments, processor and
+    its features. A file begins with a digest of its content, and holds the key too: two types can have one name.
+    """
+
+    def _path(self, key: Any) -> Path:
+        name = hashlib.sha256(repr((self._version, self._index_name, key)).encode()).hexdigest()
+        return Path(self._cache_path, f"{self._index_name.partition('-')[0]}-{self._source_stamp}-{name[:32]}.nbc")
+
+    def save(self, key: Any, data: Any) -> None:
+        body = self._dump((self._index_name, key, data))
+        with self._open_for_write(self._path(key)) as file:
+            file.write(hashlib.sha256(body).digest() + body)
+        for old in Path(self._cache_path).glob("*.nb[ci]"):
+            # Of other sources; another process may remove it at the same time.
+            with suppress(OSError):
+                if f"-{self._source_stamp}-" not in old.name and time() - old.stat().st_mtime > _KEPT:
+                    old.unlink()
+
+    def load(self, key: Any) -> Any:
+        try:
+            content = self._path(key).read_bytes()
+            body = content[_DIGEST:]
+            if hashlib.sha256(body).digest() != content[:_DIGEST]:
+                return None
+            *found, data = pickle.loads(body)
+        except (OSError, AttributeError, ImportError):
+            # It is not there, belongs to another user, or names types that this process does not have.
+            return None
+        return data if found == [self._index_name, key] else None
+
+
+_DIGEST = hashlib.sha256().digest_size
+
+# Seconds for which compiled code of other sources is kept.
+_KEPT = 86_400.0
+
+#: Further options of kernels, and of functions that are compiled into kernels.
+KERNEL_COMPILER: dict[str, Any] = {"pipeline_class": _KernelCompiler}
+CALLEE_COMPILER: dict[str, Any] = {"pipeline_class": _CalleeCompiler}
 
 
 def keep_on_disk(dispatcher: Any, digest: str, announce: Callable[[], None]) -> None:
     """Keep the compiled code of a function on disk, under a name that covers the sources of all functions it calls.
 
-    Numba itself notices an edit only in the file of the function, and trusts what the files of its cache hold. Without
-    Numba's private interfaces, or if no folder for the cache is writable, each process compiles the function anew.
+    Numba itself notices an edit only in the file of the function, and trusts what the files of its cache hold. If no
+    folder for the cache is writable, each process compiles the function anew.
 
     Parameters
     ----------
@@ -424,8 +404,6 @@ def keep_on_disk(dispatcher: Any, digest: str, announce: Callable[[], None]) -> 
     announce : callable
         Called before each compilation.
     """
-    if not AVAILABLE:
-        return
     problem = ""
     try:
         dispatcher.enable_caching()
