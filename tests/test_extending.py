@@ -191,6 +191,13 @@ CLAIMS = {
         coarse, fine = (run(scene, {"method": "heun", "steps": n})["x_end"] - exact for n in (200, 400))
         assert 3.8 < coarse / fine < 4.2, (coarse.item(), fine.item())
     """,
+    "a result names the files of what it used": """
+        still_disc = {"friction": {"law": "weakening", "rest": {"mu_s": 0.15, "mu_k": 0.1}, "v1": 1.0}, "drive": still}
+        exact = run({**disc, **still_disc, "time": {"span": 0.1}}, "event")
+        assert exact.attrs["own_files"] == "my_disc.py, my_run_up.py", exact.attrs
+        plain = run({**belt, "friction": {"law": "coulomb", "mu_k": 0.1}}, {"method": "heun", "steps": 20})
+        assert plain.attrs["own_files"] == "my_heun.py"
+    """,
     "all methods take a formula on the disc, and agree on a body that swings there": """
         friction = {"law": "weakening", "rest": {"mu_s": 0.15, "mu_k": 0.1}, "v1": 1.0}
         scene = {**disc, "friction": friction, "drive": still, "time": {"span": 0.2}}

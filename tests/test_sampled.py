@@ -453,7 +453,9 @@ def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatc
     assert "riding: 0.00% to 100.00%" in capsys.readouterr().out
     write(tmp_path / "one.yaml", config(n=64, sensitivity=True))
     assert main(["run", "one.yaml", "--jobs", "1"]) == 0
-    assert re.search(r"riding: .*\n    total Sobol index: \S+ \d+% \(\d+% to \d+%\)", capsys.readouterr().out)
+    out = capsys.readouterr().out
+    assert re.search(r"riding: .*\n    total Sobol index: \S+ \d+% \(\d+% to \d+%\)", out)
+    assert "sample: 64 points of each cell: 192 runs, 128 of them for the probabilities; sobol" in out
     assert (tmp_path / "my.png").exists()
     for arguments in (
         ["info", "my.nc"],

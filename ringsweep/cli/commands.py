@@ -385,6 +385,8 @@ def _print_summary(name: str, result: Any) -> None:
 
         print(in_lines(result))
     print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))
+    if "own_files" in result.attrs:
+        print("own files:", result.attrs["own_files"], "(RINGSWEEP_LAWS must name them to run it again)")
     print("versions:", result.attrs["ringsweep_version"], result.attrs.get("versions", ""))
 
 

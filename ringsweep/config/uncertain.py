@@ -27,7 +27,7 @@ from ringsweep.statistics import DISTRIBUTIONS, METHODS, distribution, saltelli,
 
 #: Keys of ``sweep.sample``.
 KEYS: Keys = {
-    "n": Parameter("1", "number of samples of each cell", lower=2, upper=1_000_000, whole=True),
+    "n": Parameter("1", "points of each cell", lower=2, upper=1_000_000, whole=True),
     "seed": Parameter("1", "seed of the sample", lower=0, upper=2**53, whole=True, default=0),
     "replicates": Parameter("1", "independent parts of the sample", lower=4, upper=64, whole=True, default=8),
     "method": Key("method of drawing points", dict.fromkeys(METHODS, ""), METHODS[0]),

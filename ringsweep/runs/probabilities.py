@@ -180,10 +180,12 @@ class Sampled(Grid):
         """Attributes that say what was sampled, and how the intervals follow from it."""
         sample = self.asked
         way = "Clopper and Pearson" if sample.independent else "scatter of the replicates (Korn and Graubard)"
-        points = f"{sample.n * len(sample.own)} runs"
-        rest = f", and {sample.n * len(sample.factors)} more for the indices" if sample.sensitivity else ""
+        runs, own = sample.n * sample.rows, sample.n * len(sample.own)
+        told = f"{sample.n} points of each cell" + (
+            f": {runs} runs, {own} of them for the probabilities" * (runs > own)
+        )
         return super().attributes() | {
-            "sample": f"{points} in each cell{rest}: {sample.method}, seed {sample.seed}, "
+            "sample": f"{told}; {sample.method}, seed {sample.seed}, "
             f"{sample.replicates} replicates; " + "; ".join(f"{factor.name} {factor}" for factor in sample.factors),
             "sample_interval": f"{100 * CONFIDENCE:g} %: {way}; a run that is not certified counts both ways",
             **({"survival_of": censored(self.config.scene)} if sample.survival else {}),

@@ -19,9 +19,11 @@ import numba
 import numpy as np
 
 from ringsweep.compile import SOURCES_DIGEST
+from ringsweep.compile.cache import OWN_FILES
 from ringsweep.config import Config
 from ringsweep.models import model_of
 from ringsweep.models.scene import LAW
+from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import TRAITS
 
 # Reading the metadata of a package takes milliseconds.
@@ -146,11 +148,20 @@ def attributes(config: Config) -> dict[str, Any]:
         "versions": json.dumps(versions),
         "platform": f"{platform.system()} {platform.machine()}",
         "processors": processor(),
+        **({"own_files": ", ".join(own)} if (own := _own_files(config)) else {}),
         "method": config.solver.name,
         "solver": json.dumps(options if len(options) > 1 else next(iter(options.values()))),
         "configuration": json.dumps({**config.source, "scene": _with_defaults(config)}),
         "date_created": now,
     }
+
+
+def _own_files(config: Config) -> list[str]:
+    """Names of the user's files that define the model, a law, the drive or the method of a configuration."""
+    scene = config.scene
+    used = [type(config.solver), type(model_of(scene.structure)), DRIVES.get(scene.structure.drive)]
+    used += [structure.law_type for structure in scene.structures.values()]
+    return sorted(path.name for path in OWN_FILES if path.stem in {getattr(one, "__module__", "") for one in used})
 
 
 def references(config: Config) -> str:
