@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import LogNorm, to_rgb
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from matplotlib.quiver import Quiver
@@ -268,23 +268,6 @@ class TestMaps:
         handles = dict(zip(entries(axes), axes.get_legend().get_patches(), strict=True))
         assert isinstance(handles["open, 25.0 %"], Rectangle)
         assert handles["open, 25.0 %"].get_facecolor()[:3] == to_rgb(AFTERMATH_COLOURS[AFTERMATHS[OPEN]])
-
-    def test_gaps_over_decades_follow_the_logarithm_unasked_and_zeros_have_a_colour_of_their_own(self):
-        gaps = np.append(np.zeros(10), np.geomspace(1e-8, 1e-2, 90))
-        impacts = np.append(np.zeros(10), np.linspace(10, 400, 90)).astype(int)
-        ds = sweep_of(gap_max=gaps, impacts=impacts)
-        figure = plots.regime_map(ds, var="gap_max")
-        bar = figure.axes[1]
-        assert bar.get_yscale() == "log"
-        assert entries(figure.axes[0]) == ["exactly 0, 10.0 %"]
-        colours = np.unique(figure.axes[0].collections[0].get_array().reshape(100, 4), axis=0)
-        assert len(colours) > 85
-        assert plots.regime_map(ds, var="impacts").axes[1].get_yscale() == "linear"
-        assert plots.regime_map(ds, var="gap_max", norm="linear").axes[1].get_yscale() == "linear"
-
-    def test_numbers_with_no_positive_one_are_not_on_a_logarithmic_scale(self):
-        figure = plots.regime_map(sweep_of(gap_max=np.zeros(9)), var="gap_max")
-        assert not isinstance(figure.axes[0].collections[0].norm, LogNorm)
 
     def test_a_run_without_recovery_is_told_in_the_legend(self):
         ds = sweep_of(t_recovered=np.where(np.arange(16) < 4, np.nan, 1.0 + np.arange(16)))

@@ -130,27 +130,23 @@ class TestBoundary:
         assert cli.main(["map", "my.nc", "--boundaries", "separating"]) == 2
         assert "my-separating.nc: holds a result of another kind" in capsys.readouterr().err
 
-    def test_refusal_of_an_unknown_regime_names_the_nearest(self, ds):
-        with pytest.raises(InputError, match=r"not a regime; did you mean `separating`\?"):
-            ringsweep.boundary(ds, "seperating")
-
-    def test_word_of_the_belt_is_refused_with_the_words_of_a_ring(self, ds):
-        with pytest.raises(InputError, match=r"can be 'stick-slip': those of model ring are resting, .*, failed, with"):
-            ringsweep.boundary(ds, "stick-slip")
-
     @pytest.mark.parametrize(
-        ("regime", "tolerance", "path"),
+        ("regime", "tolerance", "problem"),
         [
-            ("separated", 1e-3, "regime"),
-            ("separating", 0.0, "tolerance"),
-            ("separating", True, "tolerance"),
-            ("separating", "narrow", "tolerance"),
+            ("seperating", 1e-3, r"regime: .*not a regime; did you mean `separating`\?"),
+            (
+                "stick-slip",
+                1e-3,
+                "regime: .* can be 'stick-slip': those of model ring are resting, .*, failed, with",
+            ),
+            ("separating", 0.0, "tolerance: "),
+            ("separating", True, "tolerance: "),
+            ("separating", "narrow", "tolerance: "),
         ],
     )
-    def test_mistake_is_refused(self, ds, regime, tolerance, path):
-        with pytest.raises(InputError) as caught:
+    def test_mistake_is_refused(self, ds, regime, tolerance, problem):
+        with pytest.raises(InputError, match=problem):
             ringsweep.boundary(ds, regime, tolerance)
-        assert caught.value.path == path
 
     @pytest.mark.slow
     def test_curves_are_drawn_over_the_map_and_written(self, ds, curves, tmp_path, capsys):

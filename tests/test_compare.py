@@ -102,13 +102,6 @@ class TestSweep:
         again = ringsweep.run(json.loads(found.attrs["configuration"]), progress=False)
         np.testing.assert_array_equal(again.x_end, found.x_end)
 
-    def test_saved_sweep_over_laws_is_loaded_unchanged_and_drawn(self, swept, tmp_path):
-        netcdf.save(swept, tmp_path / "laws.nc")
-        loaded = netcdf.load(tmp_path / "laws.nc")
-        xr.testing.assert_identical(loaded, swept)
-        ticks = plots.regime_map(loaded, x="friction.law").axes[0].get_xticklabels()
-        assert [tick.get_text() for tick in ticks] == LAWS
-
 
 class TestConfiguration:
     @pytest.mark.parametrize(
@@ -337,15 +330,6 @@ class TestCommands:
         assert "holds this sweep already" in out
         assert "friction_law: coulomb, stiction, tustin\n" in out
         assert (folder / "laws-friction-law-tustin.png").exists()
-
-    @pytest.mark.slow
-    def test_simulate_prints_a_line_for_each_law(self, folder, capsys):
-        assert main(["simulate", "laws.yaml"]) == 0
-        out, _ = capsys.readouterr()
-        assert [line.split(":")[0] for line in out.splitlines()[:3]] == LAWS
-        assert (folder / "laws-run.png").exists()
-        assert main(["info", "laws-run.nc"]) == 0
-        assert "friction_law 3" in capsys.readouterr().out
 
     @pytest.mark.slow
     def test_plot_draws_one_law_of_a_stored_run(self, folder, compared, capsys):

@@ -321,18 +321,3 @@ class TestSweepsInPython:
         # The file holds what is needed to run it again.
         again = ringsweep.run(tmp_path / "own.nc", progress=False)
         np.testing.assert_array_equal(again["x_section"], yaml["x_section"])
-
-    @pytest.mark.parametrize(
-        ("given", "path"),
-        [
-            ({"record": {"sections": 1}}, "record.sections"),
-            ({"record": [1]}, "record"),
-            ({"follow": "belt.velocity"}, "sweep.follow"),
-            ({"follow": {"axis": "force.frequency", "direction": "left"}}, "sweep.follow.direction"),
-            ({"follow": "force.frequency", "refine": True}, "sweep.refine"),
-        ],
-    )
-    def test_errors_name_their_paths(self, given, path):
-        with pytest.raises(InputError) as error:
-            ringsweep.sweep(HARDENING, {"force.frequency": FREQUENCIES[:3]}, **given, progress=False)
-        assert error.value.path == path

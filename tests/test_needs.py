@@ -137,50 +137,39 @@ def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, t
     assert write(config, tmp_path / "a.nc", Execution(progress=False))
 
 
-@pytest.mark.parametrize("solver", ["auto", {"method": "event", "certify": False}])
-def test_columns_take_no_more_bytes_than_planned(scene, solver):
-    config = {"scene": scene, "solver": solver, "sweep": {"grid": {"drive.amplitude": [0.5, 2.0]}}}
-    found = ringsweep.run(config, progress=False)
-    bytes_of_cell = plan_of(load(config)).bytes_of_cell()
-    taken = sum(variable.dtype.itemsize for variable in found.data_vars.values())
-    assert taken <= bytes_of_cell <= taken + 8
+@pytest.fixture
+def each_takes(monkeypatch):
+    """Function that lets each run that is measured take some seconds for a share of its span."""
+
+    def take(seconds, share=1.0):
+        def compute(config, layout, positions):
+            assert getattr(config.solver, "steps", 1000) == getattr(config.solver, "max_steps", 1000) == 1000
+            regime, span = FAILED if share < 1.0 else 0, config.scene.values["time.span"]
+            ended = {"regime": np.full(len(positions), regime), "t_end": np.full(len(positions), share * span)}
+            return TaskResult(positions, ended, seconds * len(positions), {}, "")
+
+        monkeypatch.setattr(needs, "compute_task", compute)
+
+    return take
 
 
 @pytest.mark.parametrize(("n", "time"), [(8, "2.1 min"), (244, "33 h")])
-def test_time_is_that_of_the_measured_cells_shared_among_threads(sweep, tmp_path, monkeypatch, n, time):
-    def compute(config, layout, positions):
-        ended = {"regime": np.zeros(len(positions)), "t_end": np.zeros(len(positions))}
-        return TaskResult(positions, ended, 6.0 * len(positions), {}, "")
-
-    monkeypatch.setattr(needs, "compute_task", compute)
+def test_time_is_that_of_the_measured_cells_shared_among_threads(sweep, tmp_path, each_takes, n, time):
+    each_takes(6.0)
     assert f"time: about {time} on 3 threads" in needs.describe(load(sweep(n)), tmp_path / "a.nc", 3)
 
 
 @pytest.mark.parametrize("solver", [{"method": "auto", "max_steps": 10**9}, {"method": "rk4", "steps": 10**7}])
-def test_time_of_long_cells_follows_from_their_first_steps(sweep, tmp_path, monkeypatch, solver):
+def test_time_of_long_cells_follows_from_their_first_steps(sweep, tmp_path, each_takes, solver):
     """A thousand steps reach a ten-thousandth of the span."""
-
-    def compute(config, layout, positions):
-        assert getattr(config.solver, "steps", 1000) == getattr(config.solver, "max_steps", 1000) == 1000
-        failed = "max_steps" in solver
-        span = config.scene.values["time.span"]
-        ended = {"regime": np.full(len(positions), FAILED if failed else 0)}
-        ended["t_end"] = np.full(len(positions), 1e-4 * span if failed else span)
-        return TaskResult(positions, ended, 0.05 * len(positions), {}, "")
-
-    monkeypatch.setattr(needs, "compute_task", compute)
+    each_takes(0.05, 1e-4 if "max_steps" in solver else 1.0)
     assert "time: about 4.4 h on 2 threads" in needs.describe(load(sweep(8, solver=solver)), tmp_path / "a.nc", 2)
 
 
-def test_time_of_a_sampled_sweep_is_that_of_all_its_runs(sweep, tmp_path, monkeypatch):
+def test_time_of_a_sampled_sweep_is_that_of_all_its_runs(sweep, tmp_path, each_takes):
     sample = {"n": 64, "of": {"friction.rest.mu_k": {"uniform": [0.05, 0.1]}}}
     config = load({"scene": load(sweep(2)).source["scene"], "sweep": {"sample": sample}})
-
-    def compute(config, layout, positions):
-        ended = {"regime": np.zeros(len(positions)), "t_end": np.zeros(len(positions))}
-        return TaskResult(positions, ended, 2.0 * len(positions), {}, "")
-
-    monkeypatch.setattr(needs, "compute_task", compute)
+    each_takes(2.0)
     told = needs.describe(config, tmp_path / "a.nc", 1)
     assert "cells: 1; 64 runs in each" in told
     assert "time: about 2.1 min on 1 threads" in told

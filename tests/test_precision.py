@@ -9,7 +9,6 @@ import yaml
 from belts import with_all_parts
 
 import ringsweep
-from ringsweep import plots
 from ringsweep.cli import main
 from ringsweep.cli.precision_table import report
 from ringsweep.config import load
@@ -92,13 +91,6 @@ class TestDataset:
         assert set(found["method"].values) == {"event", "rk4"}
         assert found.attrs["configured"] == "method: event, rtol: 1e-10"
         assert found.attrs["configured"] in found["solver"].values
-
-    def test_dataset_is_unchanged_after_saving_and_loading(self, found, tmp_path):
-        netcdf.save(found, tmp_path / "found.nc")
-        again = netcdf.load(tmp_path / "found.nc")
-        assert again.equals(found)
-        assert again.attrs == found.attrs
-        assert report(again) == report(found)
 
 
 class TestErrors:
@@ -305,12 +297,3 @@ def test_result_of_another_kind_is_neither_replaced_nor_drawn(folder, capsys):
     ):
         assert main(arguments) == 2
     assert {name: (folder / name).read_bytes() for name in kept} == kept
-
-
-def test_picture_shows_the_measured_errors_and_the_target(found):
-    axes = plots.work_precision(found).axes[0]
-    (event,) = (line for line in axes.lines if line.get_label() == "event")
-    rows = found["method"].values == "event"
-    np.testing.assert_array_equal(event.get_xdata(), found["time_per_run"][rows])
-    np.testing.assert_array_equal(event.get_ydata(), found["error_end"][rows].median("cell"))
-    assert any(np.allclose(line.get_ydata(), TARGET, rtol=1e-12) for line in axes.lines)

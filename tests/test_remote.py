@@ -215,7 +215,11 @@ def test_interrupt_while_waiting_for_a_worker_stops_the_sweep(scene, tmp_path, m
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
-        (["--scheduler", "http://127.0.0.1:1"], "no Dask scheduler answers at 'http://127.0.0.1:1'"),
+        (
+            ["--scheduler", "http://127.0.0.1:1"],
+            "no Dask scheduler answers at 'http://127.0.0.1:1': give tcp://HOST:PORT",
+        ),
+        (["--scheduler", "inproc://x"], "give tcp://HOST:PORT"),
         (["--backend", "dask"], "--scheduler ADDRESS"),
         (["--backend", "threads", "--scheduler", "tcp://127.0.0.1:1"], "--backend dask"),
         (["--scheduler", "tcp://127.0.0.1:1"], "no Dask scheduler answers at 'tcp://127.0.0.1:1'"),
@@ -231,13 +235,6 @@ def test_wrong_options_for_dask_are_refused_in_one_line(scene, tmp_path, monkeyp
     assert problem in message
     assert message.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
-
-
-@pytest.mark.parametrize("address", ["inproc://x", "http://127.0.0.1:8786"])
-def test_address_of_another_kind_is_told_with_its_cure_before_a_client_tries_it(address, monkeypatch):
-    monkeypatch.setattr("ringsweep.runs.dask.Client", None)
-    with pytest.raises(ringsweep.InputError, match="give tcp://HOST:PORT"):
-        Execution(None, address).open().__enter__()
 
 
 @pytest.mark.slow

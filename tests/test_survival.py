@@ -521,11 +521,6 @@ class TestResultFile:
         assert not write(load(two), one, Execution(progress=False))
         assert "replaced" not in caplog.text
 
-    def test_file_of_a_single_run_has_no_dimension(self, scene, tmp_path):
-        with ringsweep.run({"scene": scene}, tmp_path / "out.nc", progress=False) as found:
-            assert not found.sizes
-            xr.testing.assert_equal(found.load(), ringsweep.run({"scene": scene}, progress=False))
-
 
 @pytest.mark.parametrize(
     "solver", mostly_slow(["auto", {"method": "rk4", "steps": 300}], ["auto"]), ids=["event", "rk4"]
