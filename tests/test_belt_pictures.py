@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from belts import on_belt
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.quiver import Quiver
@@ -25,14 +26,7 @@ STICK = _MODE_STYLES[0]["color"]
 
 
 def belt(friction, span=20.0, **changes):
-    return {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": STIFFNESS},
-        "belt": {"velocity": BELT},
-        "friction": {"mu_s": 0.15, "mu_k": 0.1} | friction,
-        "time": {"span": span},
-    } | changes
+    return on_belt({"mu_s": 0.15, "mu_k": 0.1} | friction, STIFFNESS, velocity=BELT, span=span) | changes
 
 
 @pytest.fixture(scope="module")

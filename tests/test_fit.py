@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from belts import on_belt
 
 import ringsweep
 from ringsweep import cli, plots
@@ -16,14 +17,7 @@ from ringsweep.statistics import unit_points
 
 lmfit = pytest.importorskip("lmfit")
 
-BELT = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 2.0},
-    "belt": {"velocity": 0.1},
-    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
-    "time": {"span": 10.0},
-}
+BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=10.0)
 T = np.linspace(0.1, 20.0, 150)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 
 import ringsweep
 from ringsweep.cli import main
@@ -20,14 +20,7 @@ from ringsweep.storage import netcdf
 CONFIGS = Path(__file__).parents[1] / "configs"
 TARGET = 1e-7
 
-BELT = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 2.0},
-    "belt": {"velocity": 0.1},
-    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
-    "time": {"span": 9.0},
-}
+BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=9.0)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from belts import on_belt
 from scipy.special import ndtr, ndtri
 from xarray.testing import assert_identical
 
@@ -29,15 +30,7 @@ from ringsweep.statistics import (
 )
 
 # A body on a belt rides until k v t = mu_s m g.
-BELT: dict[str, Any] = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 2.0},
-    "belt": {"velocity": 0.1},
-    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.05},
-    "gravity": 9.81,
-    "time": {"span": 7.0},
-}
+BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.05}, 2.0, velocity=0.1, gravity=9.81, span=7.0)
 SAMPLE: dict[str, Any] = {"n": 256, "of": {"friction.mu_s": {"normal": [0.15, "10 %"]}}}
 
 

@@ -5,20 +5,14 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from belts import on_belt
 
 import ringsweep
 from ringsweep import cli
 from ringsweep.runs.thresholds import in_words
 from ringsweep.storage import netcdf
 
-BELT = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 2.0},
-    "belt": {"velocity": 0.1},
-    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
-    "time": {"span": 10.0},
-}
+BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=10.0)
 
 
 class TestThreshold:
