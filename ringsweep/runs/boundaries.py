@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from itertools import chain
 from typing import Any
@@ -17,11 +17,13 @@ from ringsweep.config import Axes, Config, load
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
+from ringsweep.models import WITH_IMPACT, model_of
+from ringsweep.models.scene import Scene
+from ringsweep.quantities.flags import AFTERMATHS, REGIMES
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import INFERRED, configuration_of, meanings_of, swept
 from ringsweep.runs.executors import Execution
-from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
 
 logger = logging.getLogger("ringsweep")
@@ -180,6 +182,36 @@ def word_in(ds: xr.Dataset, word: str) -> tuple[str, int]:
                 return name, flags[word]
             known += flags
     raise InputError("regime", f"{show(word)} is not a regime{suggestion(word, known)}")
+
+
+def check_word(word: object, scene: Scene, varied: Collection[str] = ()) -> None:
+    """Refuse a word that no run of a scene can have.
+
+    Parameters
+    ----------
+    word : object
+    scene : Scene
+    varied : collection of str
+        Paths of numbers that vary.
+
+    Raises
+    ------
+    InputError
+        If it is no word of a regime or of an aftermath, or none of this scene.
+    """
+    model = scene.structure.model
+    known = model_of(scene.structure).regimes({*varied, *scene.values})
+    if word not in REGIMES + AFTERMATHS:
+        words = known + AFTERMATHS if scene.structure.impact else known
+        raise InputError("regime", f"{show(word)} is not a regime" + suggestion(word, words))
+    if word in known or (word in AFTERMATHS and scene.structure.impact):
+        return
+    if word in AFTERMATHS and model in WITH_IMPACT:
+        raise InputError("regime", f"{show(word)} is said of runs that go on: it needs impact in the scene")
+    also = f", with impact also {', '.join(AFTERMATHS)}" if scene.structure.impact or model in WITH_IMPACT else ""
+    raise InputError(
+        "regime", f"no run of this scene can be {show(word)}: those of model {model} are {', '.join(known)}{also}"
+    )
 
 
 def _checked(ds: xr.Dataset, regime: str) -> tuple[str, int, list[str]]:

@@ -19,9 +19,8 @@ from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show, spelled
 from ringsweep.quantities.variables import QUANTILE_ENDS, common_unit, in_unit, words, written_unit
-from ringsweep.runs.boundaries import bisect, located, run_points, word_in
+from ringsweep.runs.boundaries import bisect, check_word, located, run_points, word_in
 from ringsweep.runs.executors import Execution
-from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
 from ringsweep.statistics import quantiles
 from ringsweep.storage.provenance import attributes
