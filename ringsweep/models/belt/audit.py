@@ -36,8 +36,9 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     x, v = y
     body, push = scene.body, force_in(scene.drive, forcing)
     velocity = forcing[1] if mode.sign == 0 else moving(scene, v + forcing[1], v, forcing[1])
-    length = abs(x) + length_scale(scene, abs(velocity) + abs(forcing[1]))
-    speed, largest, relaxation = speed_scale(scene, length), 0.0, 0.0
+    moves = abs(velocity) + abs(forcing[1])
+    length = abs(x) + length_scale(scene, moves)
+    speed, largest, relaxation = speed_scale(scene, length, moves), 0.0, 0.0
     if mode.sign == 0:
         motion = x, push, velocity
         normal, _, friction = ring.held(body, 1.0, motion, x * x * x, forcing[2], 0.0)

@@ -153,18 +153,19 @@ def _stiffness_of_cubic(body):
 
 
 @inlined
-def _time_without_spring(scene):
-    """Time in which a body without a spring moves by the unit of length, s: at most 1 s."""
-    return min(1.0, scene.forcing_period, scene.span)
+def _without_spring(scene, velocity):
+    """Time in which a body without a spring stops, at most a period or the span, s; and its acceleration, m/s^2."""
+    acceleration = scene.mu_s * scene.body.gravity + largest_force(scene.drive) / scene.body.mass
+    longest, enough = min(scene.forcing_period, scene.span), acceleration > 0.0 and velocity > 0.0
+    return min(longest, velocity / acceleration) if enough else longest, acceleration
 
 
 @inlined
 def length_scale(scene, velocity):
     """Length in units of which errors are measured, m, for a body with this velocity (m/s)."""
     body, cubic = scene.body, _cubic_stiffness(scene.body)
-    load = scene.mu_s * body.gravity * body.mass + largest_force(scene.drive)
-    time = _time_without_spring(scene)
-    by_velocity, by_load = velocity * time, load / body.mass * time * time
+    time, acceleration = _without_spring(scene, velocity)
+    by_velocity, by_load, load = velocity * time, acceleration * time * time, acceleration * body.mass
     if body.stiffness > 0.0:
         by_velocity, by_load = velocity * (body.mass / body.stiffness) ** 0.5, load / body.stiffness
     if cubic > 0.0:
@@ -175,8 +176,12 @@ def length_scale(scene, velocity):
 
 
 @inlined
-def speed_scale(scene, length):
-    """Speed in units of which errors are measured, m/s, for a motion over this length (m)."""
+def speed_scale(scene, length, velocity):
+    """Speed in units of which errors are measured, m/s, for a motion over this length (m) with this velocity (m/s)."""
     body = scene.body
     stiffness_per_mass = (body.stiffness + max(_cubic_stiffness(body), 0.0) * length * length) / body.mass
-    return length * stiffness_per_mass**0.5 if stiffness_per_mass > 0.0 else length / _time_without_spring(scene)
+    if stiffness_per_mass > 0.0:
+        return length * stiffness_per_mass**0.5
+    # Without a spring the place does not matter.
+    time, acceleration = _without_spring(scene, velocity)
+    return velocity + acceleration * time + 1e-290

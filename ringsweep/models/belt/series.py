@@ -233,8 +233,9 @@ def _expand(scene, mode, t, y, tolerance, c):
     if ring.if_load_varies(body, c[NORMAL, 0] == 0.0, False):
         _from_no_load(c, mode.sign == 0)
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
-    length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
-    speed = speed_scale(scene, length)
+    velocity = abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1])
+    length = abs(c[X, 0]) + length_scale(scene, velocity)
+    speed = speed_scale(scene, length, velocity)
     speed = speed if holds_in_band(scene.law) else speed_in(scene, mode, speed)
     per_force = 0.0
     if mode.sign == 0 or yielding:
