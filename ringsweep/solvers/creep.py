@@ -202,6 +202,9 @@ def _first_event(scene, start, scratch, taken, views):
         if h_below == 0.0:
             continue
         value_below = _guard_after(scene, start, scratch, h_below, g)
+        if value_below > 0.0 > after[0][g]:
+            # The polynomial has cut a corner of the guard, which vanishes later.
+            h_below, value_below = s, after[0][g]
         # Another guard may vanish first, or the dense output may be below zero by its error alone. A body at rest stays
         # at zero.
         if value_below > 0.0 or value_below == before[0][g] == 0.0:
