@@ -100,12 +100,8 @@ def level_at_breakaway(c, slow, mode, low, size):
 
 @inlined
 def rate_at_rest(scene):
-    """Unit of the error of the angular velocity of a body at rest on a ring, rad/s.
-
-    It is 1 rad/s, but at most the rate of a swing, and at least a 64th of that.
-    """
-    swing = (scene.body.gravity / scene.body.radius) ** 0.5 + 1.0 / scene.span
-    return max(min(1.0, swing), swing / 64.0)
+    """Unit of the error of the angular velocity of a body at rest on a ring, rad/s: a 16th of the rate of a swing."""
+    return (scene.body.gravity / scene.body.radius) ** 0.5 / 16.0 + 1.0 / (16.0 * scene.span)
 
 
 @inlined

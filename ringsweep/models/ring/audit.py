@@ -117,8 +117,7 @@ _FALL_FACTOR = 5.0
 @audit.least_scales.implements(ring.Ring, ring.BristleRing)
 def least_rates(batch):
     """The scale of an angular velocity at least, rad/s, see :func:`ringsweep.models.sliding.rate_at_rest`."""
-    swing = np.sqrt(batch.body.gravity / batch.body.radius) + 1.0 / batch.span
-    return {"rad s-1": np.maximum(np.minimum(1.0, swing), swing / 64.0)}
+    return {"rad s-1": rate_at_rest(batch)}
 
 
 @audit.is_reaction.implements(ring.Ring, ring.BristleRing)
