@@ -17,7 +17,6 @@ from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
-from ringsweep.models.belt.bristles import Mode as BristleMode
 from ringsweep.models.belt.series import Mode
 from ringsweep.models.interface import audit, implicit, series
 from ringsweep.numerics.terms import COLUMNS
@@ -366,7 +365,7 @@ class TestLinearisation:
         of_law = {"v0": 0.1} if law == "bengisu-akay" else {"sigma0": 30.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.1}
         scene["friction"] |= of_law
         cell = cell_of(scene)
-        mode = Mode(1, BAND, -1) if law == "bengisu-akay" else BristleMode(1, KINETIC)
+        mode = Mode(1, BAND if law == "bengisu-akay" else KINETIC, -1)
         t, x = 0.6, (0.4, 0.05, 0.003)[: 2 if law == "bengisu-akay" else 3]
 
         def rates(t, x):

@@ -33,7 +33,7 @@ _SHAPES: dict[Any, tuple[int, int]] = {}
 PATIENCE = 1_000_000
 
 
-_with_length = replacing("h")
+_with_length, _with_entry_guard = replacing("h"), replacing("entry_guard")
 
 
 class LocalErrors(NamedTuple):
@@ -226,7 +226,7 @@ def _after_step(scene, mode, guard, now, s, limit, y):
         return now, status, mode, y
     if now.t >= scene.span:
         return now, COMPLETE, mode, y
-    return now, RUNNING, series.after_first_step(mode) if s > 0.0 else mode, y
+    return now, RUNNING, _with_entry_guard(mode, -1) if s > 0.0 else mode, y
 
 
 @inlined

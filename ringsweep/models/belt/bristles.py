@@ -7,11 +7,11 @@ The state is ``(x, velocity, z)`` for steps of constant length, with the velocit
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.belt.force import length_scale
 from ringsweep.models.belt.record import begin
+from ringsweep.models.belt.series import Mode
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
@@ -83,13 +83,6 @@ def _keep_deflection(scene, row, column, y):
         row[column] = y[2]
 
 
-class Mode(NamedTuple):
-    """Mode: sign of the sliding velocity, and whether the contact counts as stuck (BAND) or slips (KINETIC)."""
-
-    sign: int
-    region: int
-
-
 @modes.begin.implements(BristleBelt)
 def _begin_modes(scene):
     t, x, z = drives.beginning(scene.drive), scene.initial_x, _deflection_at_start(scene)
@@ -101,7 +94,7 @@ def _begin_modes(scene):
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
         sign = 1 if ring.acceleration(scene.body, K, K, motion)[0] > forcing[2] else -1
-    mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC)
+    mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC, -1)
     load = ring.reactions(scene.body, K, K, motion)[0]
     if load == 0.0:
         # The contact holds if the load begins to grow.
@@ -121,9 +114,9 @@ def _switch(scene, mode, guard, t, y):
     if after_normal < 0:
         return SEPARATED_1, mode, y
     if after_normal == 0:
-        return RUNNING, Mode(-mode.sign, BAND), (x, 0.0, z)
+        return RUNNING, Mode(-mode.sign, BAND, -1), (x, 0.0, z)
     z, region = after_yield(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
-    return RUNNING, Mode(mode.sign, region), (x, v, z)
+    return RUNNING, Mode(mode.sign, region, -1), (x, v, z)
 
 
 @implicit.to_implicit.implements(BristleBelt)

@@ -74,11 +74,6 @@ class Mode(NamedTuple):
     entry_guard: int
 
 
-@series.after_first_step.implements(Mode)
-def _after_first_step(mode):
-    return Mode(mode.sign, mode.region, -1)
-
-
 @modes.in_space.implements(belt.Belt)
 def _in_space(scene, t, y):
     forcing = drives.turn(scene.drive, t)

@@ -2,8 +2,8 @@
 
 In a mode the equations are smooth. A mode is a ``NamedTuple`` that names the sign of the sliding velocity (0 in stick),
 the region of the friction law, and, on a ring, the segment of the surface under each contact. It has the fields
-``sign`` and ``region``; it also has the field ``entry_guard`` if the model has :mod:`series`. A mode lasts while its
-guards, which are functions of the state, are positive.
+``sign``, ``region`` and ``entry_guard``: the row of the guard in :mod:`series` that is zero as the mode begins, or -1.
+A mode lasts while its guards, which are functions of the state, are positive.
 
 The state holds the place, the sliding velocity in m/s, and the deflection (m) of each bundle of bristles if there are
 any. The place is an angle (rad) or a displacement (m). The state holds the sliding velocity, not the velocity in space,

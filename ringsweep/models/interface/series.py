@@ -179,22 +179,5 @@ def row(scene, mode, c, t, s):
     """
 
 
-@hook(optional=True)
-def after_first_step(mode):
-    """The mode after its first step, when the guard that was zero on entry is zero no more.
-
-    Parameters
-    ----------
-    mode : NamedTuple
-        Its type decides which body runs.
-
-    Returns
-    -------
-    NamedTuple
-        `mode` with ``entry_guard = -1``. By default `mode` itself, for modes without this field.
-    """
-    return mode
-
-
 #: Functions without a default.
 MEMBERS = (expand, state_at, rates_at, seen_at_start, seen_at, extremes, row)

@@ -668,8 +668,3 @@ def _row(scene, mode, c, t, s):
         zone_2,
         0.0 if mode.region < 0 else float(mode.sign),
     )
-
-
-@series.after_first_step.implements(Mode)
-def _after_first_step(mode):
-    return with_slip(mode, mode.sign, mode.region, -1)
