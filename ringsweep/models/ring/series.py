@@ -533,76 +533,64 @@ def _expand_slip_guards(scene, mode, c):
 
 @inlined
 def _expand_stick(scene, mode, tolerance, c):
-    """Fill the series of stick and return what :func:`series.expand` does; the body moves with the ring."""
-    phi_0, omega_0 = c[PHI, 0], c[THETA, 1]
-    sin_0, cos_0 = sin(phi_0), cos(phi_0)
-    c[V, 0], c[OMEGA, 0], c[EPSILON, 0] = 0.0, omega_0, 2.0 * c[THETA, 2]
-    c[SIN, 0], c[COS, 0], c[SQUARE, 0] = sin_0, cos_0, omega_0 * omega_0
-    before = omega_0
-    own = 0.0, 0.0, 0.0
-    first = newest = no_factors(own)
-    for k in range(1, ORDER + 1):
-        omega = (k + 1.0) * c[THETA, k + 1]
-        sine, cosine, square = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
-        sine, cosine = (sine + before * cos_0) * INVERSE[k], -(cosine + before * sin_0) * INVERSE[k]
-        newest = set_factors(c, FACTORS, k, (before, before, omega), (cosine, sine, omega))
-        first = newest if k == 1 else first
-        c[PHI, k], c[V, k], c[OMEGA, k] = c[THETA, k], 0.0, omega
-        c[EPSILON, k] = (k + 1.0) * (k + 2.0) * c[THETA, k + 2]
-        c[SIN, k], c[COS, k], c[SQUARE, k] = sine, cosine, square + 2.0 * omega_0 * omega
-        before = omega
-    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    c[EDGE, 0] = inf
-    _expand_reserve(scene.body, mu_s1, mu_s2, c)
-    c[DETERMINANT, 0] = inf
-    one = 1.0 / tolerance
-    per_load = one / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
-    h = step_within(c, ((PHI, one), (SIN, one), (COS, one), (SLOW, per_load), (FAST, per_load)))
-    return h, h
+    """Fill the series of stick and return what :func:`series.expand` does; the body moves with the ring.
 
-
-@inlined
-def _expand_reserve(body, m1, m2, c):
-    """Fill the reactions and the guards of stick, from the series of the motion; see :func:`contact.sharing`.
-
-    NORMAL_1, NORMAL_2; the reserves of friction, N, before forward slip (SLOW) and before backward slip (FAST). For two
-    contacts also EDGE, the discriminant of the quadratic equation, or the factor of a linear one; with one contact it
-    stays infinite.
+    The guards are the reactions; the reserves of friction, N, before forward slip (SLOW) and before backward slip
+    (FAST), see :func:`contact.sharing`; and for two contacts EDGE, the discriminant of the quadratic equation, or the
+    factor of a linear one. With one contact EDGE is infinite.
     """
-    by_F2 = contact.by_friction(body)
-    first_N2 = first_F1 = first_linear = first_F2 = 0.0
-    own = 0.0, 0.0, 0.0, 0.0
+    body, (m1, _, m2, _) = scene.body, coefficients_under(scene, mode)
+    by_F2, omega_0 = contact.by_friction(body), c[THETA, 1]
+    sin_0, cos_0 = sin(c[PHI, 0]), cos(c[PHI, 0])
+    before = first_N2 = first_F1 = first_linear = first_F2 = 0.0
+    own = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     first = newest = no_factors(own)
+    c[EDGE, 0] = c[DETERMINANT, 0] = inf
     for k in range(ORDER + 1):
-        one = 1.0 if k == 0 else 0.0
-        motion = c[SIN, k], c[COS, k], c[OMEGA, k]
-        N1, N2, F1 = ring.held(body, one, motion, c[SQUARE, k], c[EPSILON, k], 0.0)
-        friction, capacity = F1, m1 * N1
+        one, omega, epsilon = 0.0, (k + 1.0) * c[THETA, k + 1], (k + 1.0) * (k + 2.0) * c[THETA, k + 2]
+        inner = inner_products(c, FACTORS, k, first, newest)
+        sine, cosine, square, rest, squared, mixed, both = part_from(inner, own, ())
+        if k == 0:
+            one, sine, cosine, square = 1.0, sin_0, cos_0, omega_0 * omega_0
+        else:
+            sine, cosine = (sine + before * cos_0) * INVERSE[k], -(cosine + before * sin_0) * INVERSE[k]
+            square += 2.0 * omega_0 * omega
+            c[PHI, k] = c[THETA, k]
+        at_zero = ring.held(body, one, (sine, cosine, omega), square, epsilon, 0.0)
+        N1, N2, F1 = at_zero
+        F2, linear, normals, friction, capacity = 0.0, 0.0, (N1, N2), F1, m1 * N1
         if ring.contact_count(body) == 2:
-            at_zero = N1, N2, F1
-            square, linear, _ = contact.sharing(m1, m2, at_zero, by_F2)
-            rest, squared, mixed, both = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
+            quadratic, linear, _ = contact.sharing(m1, m2, at_zero, by_F2)
             # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
             if k == 0:
                 first_N2, first_F1, first_linear = N2, F1, linear
-                constant = m2 * F1 * N2
-                first_term, last_term = linear * linear, 4.0 * square * constant
+                first_term, last_term = linear * linear, 4.0 * quadratic * (m2 * F1 * N2)
                 c[EDGE, 0] = first_term - last_term - _LEAST_DISCRIMINANT * (first_term + abs(last_term))
                 F2 = first_F2 = contact.shared_friction(m1, m2, at_zero, by_F2)
             else:
                 constant = m2 * (first_F1 * N2 + F1 * first_N2 + rest)
-                c[EDGE, k] = 2.0 * first_linear * linear + squared - 4.0 * square * constant
-                F2 = -(square * both + mixed + linear * first_F2 + constant)
-                F2 = F2 / (2.0 * square * first_F2 + first_linear) if m1 + m2 > 0.0 else F1 / (1.0 - by_F2[2])
-                newest = set_factors(c, FACTORS, k, (F1, linear, linear, F2), (N2, linear, F2, F2))
-                first = newest if k == 1 else first
-            if square == 0.0:
+                c[EDGE, k] = 2.0 * first_linear * linear + squared - 4.0 * quadratic * constant
+                F2 = -(quadratic * both + mixed + linear * first_F2 + constant)
+                F2 = F2 / (2.0 * quadratic * first_F2 + first_linear) if m1 + m2 > 0.0 else F1 / (1.0 - by_F2[2])
+            if quadratic == 0.0:
                 # An equation that is linear leaves the share open where its factor vanishes.
                 c[EDGE, k] = -linear
-            N1, N2, friction = contact.at(F2, at_zero, by_F2)
-            capacity = m1 * N1 + m2 * N2
-        c[NORMAL_1, k], c[NORMAL_2, k] = N1, N2
+            normal_1, normal_2, friction = contact.at(F2, at_zero, by_F2)
+            normals, capacity = (normal_1, normal_2), m1 * normal_1 + m2 * normal_2
+        if k > 0:
+            left, right = (before, before, omega, F1, linear, linear, F2), (cosine, sine, omega, N2, linear, F2, F2)
+            newest = set_factors(c, FACTORS, k, left, right)
+            first = newest if k == 1 else first
+        c[V, k], c[OMEGA, k], c[EPSILON, k] = 0.0, omega, epsilon
+        c[SIN, k], c[COS, k], c[SQUARE, k] = sine, cosine, square
+        c[NORMAL_1, k], c[NORMAL_2, k] = normals
         c[SLOW, k], c[FAST, k] = capacity + friction, capacity - friction
+        before = omega
+    per_angle = 1.0 / tolerance
+    per_load = per_angle / (body.mass * (body.gravity + body.radius * c[SQUARE, 0]))
+    units = (PHI, per_angle), (SIN, per_angle), (COS, per_angle), (SLOW, per_load), (FAST, per_load)
+    h = step_within(c, units)
+    return h, h
 
 
 @series.seen_at_start.implements(ring.Ring)
