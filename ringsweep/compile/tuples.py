@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from math import inf, nan
 from typing import Any
 
@@ -74,27 +74,36 @@ def generated(write: Callable[..., Any]) -> Any:
     return found
 
 
-def feature(otherwise: str, *, absorb: bool = False) -> Any:
+def feature(otherwise: str, *, of: type | Collection[type] = (), absorb: bool = False) -> Any:
     """Compile a formula for a feature: a part of a scene or of a record that may be missing.
 
-    Where it is missing, an empty tuple stands in place of the first argument, and kernels contain nothing of the
-    formula.
+    Where it is missing, kernels contain nothing of the formula.
 
     Parameters
     ----------
     otherwise : str
         Result where the feature is missing: an expression of the arguments, and of names of the module.
+    of : type or collection of type
+        Types of the first argument that have the feature. By default an empty tuple stands in place of one that has
+        not.
     absorb : bool
         Whether the formula is inlined whatever its size; see :func:`ringsweep.compile.absorbed`.
     """
+    having = (of,) if isinstance(of, type) else tuple(of)
 
     def decorate(body: Callable[..., Any]) -> Any:
         names = list(inspect.signature(body).parameters)
-        without = function_from_lines(
-            ", ".join(names), [f"return {otherwise}"], {"inf": inf, "nan": nan} | body.__globals__
-        )
-        found = _stub(body, names, lambda *arguments: (without if type(arguments[0]) is tuple else body)(*arguments))
-        specialise(found, lambda *kinds: without if kinds[0] == types.Tuple(()) else body, absorb=absorb)
+        scope = {"inf": inf, "nan": nan} | body.__globals__
+        without = function_from_lines(", ".join(names), [f"return {otherwise}"], scope)
+
+        def chosen(first: type | None) -> Any:
+            return body if (first in having if having else first is not tuple) else without
+
+        def typed(*kinds: Any) -> Any:
+            return chosen(tuple if kinds[0] == types.Tuple(()) else getattr(kinds[0], "instance_class", None))
+
+        found = _stub(body, names, lambda *arguments: chosen(type(arguments[0]))(*arguments))
+        specialise(found, typed, absorb=absorb)
         return found
 
     return decorate

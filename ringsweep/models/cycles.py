@@ -11,12 +11,14 @@ The place x of the body is a displacement, or an angle on a ring; lengths in m a
 
 from __future__ import annotations
 
-from math import inf, isnan, nan, sqrt
+from math import inf, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, feature, hook, inlined
+from ringsweep.compile import absorbed, feature, inlined
 from ringsweep.numerics.functions import floor, negated, select
 from ringsweep.numerics.memory import select_all
+from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.ring import BristleRing, Ring
 from ringsweep.quantities.flags import CHAOTIC, QUASI_PERIODIC, TRANSIENT
 
 
@@ -197,16 +199,17 @@ _UNSTABLE = 1.01
 _MOST_CYCLES = 64.0
 
 
-@hook(absorb=True, optional=True)
+@feature("x - other", of=(Ring, BristleRing), absorb=True)
 def difference(scene, x, other):
     """Difference of two places of the body, m or rad; on a ring without full turns."""
-    return x - other
+    apart = x - other
+    return apart - 2.0 * pi * floor(apart / (2.0 * pi) + 0.5)
 
 
-@hook(absorb=True, optional=True)
+@feature("1.0", of=(Belt, BristleBelt), absorb=True)
 def place_counts(scene):
     """1 if states at different places differ; 0 if the same motion is possible everywhere."""
-    return 1.0
+    return scene.place_counts
 
 
 @absorbed

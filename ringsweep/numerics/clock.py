@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import pi
 from typing import NamedTuple
 
-from ringsweep.compile import absorbed, hook
+from ringsweep.compile import absorbed, feature
 from ringsweep.numerics.functions import nearest
 
 
@@ -20,14 +20,9 @@ class Instant(NamedTuple):
     rest: float
 
 
-@hook(absorb=True, optional=True)
+@feature("t, 0.0", of=Instant, absorb=True)
 def parts(t):
     """Both parts of a time, s: of an :class:`Instant`, or of a number, which has no rest."""
-    return t, 0.0
-
-
-@parts.implements(Instant)
-def _parts_of_instant(t):
     return t.t, t.rest
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook
+from ringsweep.compile import feature, hook
 from ringsweep.numerics.clock import later
 from ringsweep.physics import drives
 from ringsweep.physics.functions_of_time import common_period
@@ -45,7 +45,7 @@ class Forced(NamedTuple):
     largest: Leaf
 
 
-@hook(absorb=True, optional=True)
+@feature("0.0", of=Forced, absorb=True)
 def force_in(drive, forcing):
     """Force on the body, N.
 
@@ -60,15 +60,10 @@ def force_in(drive, forcing):
     float
         0 for a drive without a force.
     """
-    return 0.0
-
-
-@force_in.implements(Forced)
-def _force_in(drive, forcing):
     return forcing[-1]
 
 
-@hook(optional=True)
+@feature("0.0", of=Forced)
 def force_rate(drive, forcing):
     """Time derivative of the force, N/s; 0 without a force.
 
@@ -78,22 +73,12 @@ def force_rate(drive, forcing):
     forcing : tuple of float
         What :func:`ringsweep.physics.drives.turn` returned.
     """
-    return 0.0
-
-
-@force_rate.implements(Forced)
-def _force_rate(drive, forcing):
     return forcing[3]
 
 
-@hook(optional=True)
+@feature("0.0", of=Forced)
 def largest_force(drive):
     """Bound on the magnitude of the force, N; 0 without a force."""
-    return 0.0
-
-
-@largest_force.implements(Forced)
-def _largest_force(drive):
     return drive.largest
 
 

@@ -7,13 +7,13 @@ ring, in which the zones are fixed.
 from __future__ import annotations
 
 import math
-from math import inf, pi
+from math import pi
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from ringsweep.compile import function_from_lines, hook, inlined, specialise
+from ringsweep.compile import feature, function_from_lines, inlined, specialise
 from ringsweep.numerics.functions import floor, nearest, select
 from ringsweep.quantities.parameters import Leaf, Parameter
 
@@ -117,7 +117,7 @@ def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
 # The defaults are those of a uniform surface.
 
 
-@hook(optional=True)
+@feature("surface.mu_s, surface.mu_k, 0.0", of=Segments)
 def coefficients(surface, segment):
     """Friction coefficients and zone of a segment.
 
@@ -131,11 +131,6 @@ def coefficients(surface, segment):
     tuple of float
         Static and kinetic coefficient, 1; number of the zone, 0 for none.
     """
-    return surface.mu_s, surface.mu_k, 0.0
-
-
-@coefficients.implements(Segments)
-def _segments_coefficients(surface, segment):
     return surface.mu_s[segment], surface.mu_k[segment], surface.arc[segment]
 
 
@@ -176,7 +171,7 @@ def _unrolled_value_at(values: Any, edges: Any, x: Any) -> Any:
 specialise(value_at, _unrolled_value_at)
 
 
-@hook(absorb=True, optional=True)
+@feature("surface.mu_s, surface.mu_k", of=Segments, absorb=True)
 def roughness(surface, turns, shift):
     """Static and kinetic friction coefficient at a place, for floats and Lanes.
 
@@ -186,11 +181,6 @@ def roughness(surface, turns, shift):
     turns, shift : float or Lanes
         The place is their sum, in turns; any number of turns. What does not change in a run is best in `shift`.
     """
-    return surface.mu_s, surface.mu_k
-
-
-@roughness.implements(Segments)
-def _segments_roughness(surface, turns, shift):
     return _segments_coefficients_at(surface, turns, shift)
 
 
@@ -216,36 +206,21 @@ def _choose_coefficients_at(surface: Any, turns: Any, shift: Any) -> Any:
 specialise(_segments_coefficients_at, _choose_coefficients_at, absorb=True)
 
 
-@hook(optional=True)
+@feature("surface.mu_s, surface.mu_k", of=Segments)
 def roughest(surface):
     """Largest static and least kinetic friction coefficient of the surface, 1."""
-    return surface.mu_s, surface.mu_k
-
-
-@roughest.implements(Segments)
-def _segments_roughest(surface):
     return surface.roughest
 
 
-@hook(optional=True)
+@feature("2.0 * pi", of=Segments)
 def narrowest(surface):
     """Width of the narrowest segment of the surface, rad."""
-    return 2.0 * pi
-
-
-@narrowest.implements(Segments)
-def _segments_narrowest(surface):
     return surface.narrowest
 
 
-@hook(optional=True)
+@feature("0, 0", of=Segments)
 def locate(surface, angle):
     """Place of a contact at `angle`, rad: segment, and number of whole revolutions to the lower edge of the segment."""
-    return 0, 0
-
-
-@locate.implements(Segments)
-def _segments_locate(surface, angle):
     revolution = math.floor(angle / (2.0 * pi))
     x = angle - 2.0 * pi * revolution
     found = -1
@@ -257,7 +232,7 @@ def _segments_locate(surface, angle):
     return found, revolution
 
 
-@hook(optional=True)
+@feature("direction * inf", of=Segments)
 def edge_ahead(surface, place, direction):
     """Angle of the next edge of a contact, rad; infinite on a uniform surface.
 
@@ -269,11 +244,6 @@ def edge_ahead(surface, place, direction):
     direction : int
         Direction of motion, +1 or -1.
     """
-    return direction * inf
-
-
-@edge_ahead.implements(Segments)
-def _segments_edge_ahead(surface, place, direction):
     j, revolution = place
     if direction > 0:
         j += 1
@@ -282,14 +252,9 @@ def _segments_edge_ahead(surface, place, direction):
     return surface.edges[j] + 2.0 * pi * revolution
 
 
-@hook(optional=True)
+@feature("place", of=Segments)
 def cross_edge(surface, place, direction):
     """Place of a contact after it has crossed the edge ahead; arguments as for :func:`edge_ahead`."""
-    return place
-
-
-@cross_edge.implements(Segments)
-def _segments_cross_edge(surface, place, direction):
     j, revolution = place
     last = len(surface.edges) - 1
     while True:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.compile import Cells, absorbed, add_scaled, hook, inlined, kernel, put, take
+from ringsweep.compile import Cells, absorbed, add_scaled, feature, inlined, kernel, put, take
 from ringsweep.errors import InputError
 from ringsweep.models.interface import audit, constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
@@ -191,14 +191,9 @@ class Diagnosis(NamedTuple):
     arc_share: Any
 
 
-@hook(absorb=True, optional=True)
+@feature("diagnosis", of=Diagnosed, absorb=True)
 def _diagnose(diagnosed, scene, diagnosis, before, now, h):
     """Diagnosis of a run after one more step."""
-    return diagnosis
-
-
-@_diagnose.implements(Diagnosed)
-def _diagnose_step(diagnosed, scene, diagnosis, before, now, h):
     return Diagnosis(
         constant_step.eigenvalue(scene, before, now, h, diagnosis.eigenvalue),
         min(diagnosis.margin, constant_step.margin(scene, before, now)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.compile import absorbed, feature, inlined
 from ringsweep.models.interface import shock
 from ringsweep.models.slip import Slip
 from ringsweep.numerics.functions import opposing, select
@@ -13,14 +13,9 @@ from ringsweep.physics.friction.registry import SetValued, family
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
 
 
-@hook(absorb=True, optional=True)
+@feature("no", of=ring.having(OnBelt, "force"), absorb=True)
 def if_force(body, yes, no):
     """`yes` if a given force acts on the body, an external or a viscous one, else `no`."""
-    return no
-
-
-@if_force.implements(*ring.having(OnBelt, "force"))
-def _if_force(body, yes, no):
     return yes
 
 
@@ -33,13 +28,8 @@ def moving(scene, velocity, v, belt_velocity):
     return _carried(family(scene.law), scene, velocity, v, belt_velocity)
 
 
-@hook(absorb=True, optional=True)
+@feature("velocity", of=SetValued, absorb=True)
 def _carried(family, scene, velocity, v, belt_velocity):
-    return velocity
-
-
-@_carried.implements(SetValued)
-def _carried_in_band(family, scene, velocity, v, belt_velocity):
     # The edge belongs to the band. Without a band the compiler sees that nothing is below 0.
     return select(abs(v) < stiction_band(scene.law) * (1.0 + 1e-15), belt_velocity, velocity)
 
@@ -69,14 +59,9 @@ def sliding(scene, x, velocity, v, forcing):
     return Slip((x, push - viscous * v, velocity), v, (K, K), (slope, slope), viscous / scene.body.mass, ())
 
 
-@hook(absorb=True, optional=True)
+@feature("found", of=SetValued, absorb=True)
 def _in_dead_band(family, scene, x, push, velocity, v, found):
     """K, its slope and the viscous coefficient, given as in slip, with those in a dead band."""
-    return found
-
-
-@_in_dead_band.implements(SetValued)
-def _balancing(family, scene, x, push, velocity, v, found):
     K, slope, viscous = found
     held = abs(v) < stiction_band(scene.law)
     load, _, friction = ring.held(scene.body, 1.0, (x, push, velocity), x * x * x, 0.0, 0.0)
@@ -142,13 +127,8 @@ def stuck_gradient(scene, x):
     return -friction, scene.mu_s * load
 
 
-@hook(optional=True)
+@feature("0.0", of=ring.having(OnBelt, "cubic"))
 def _cubic_stiffness(body):
-    return 0.0
-
-
-@_cubic_stiffness.implements(*ring.having(OnBelt, "cubic"))
-def _stiffness_of_cubic(body):
     return body.cubic
 
 

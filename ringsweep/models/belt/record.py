@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, feature, hook, inlined, replacing
+from ringsweep.compile import absorbed, feature, inlined, replacing
 from ringsweep.models import cycles, section, tangent
 from ringsweep.models.belt.force import breakaway_force
 from ringsweep.models.cycles import RETURN, Cycles, Mark
@@ -219,11 +219,6 @@ def _first_time(scene):
     return end if end <= scene.span else 0.5 * scene.span
 
 
-@cycles.place_counts.implements(Belt, BristleBelt)
-def _place_counts(scene):
-    return scene.place_counts
-
-
 @recorder.lend.implements(Belt, BristleBelt)
 def _lend(scene, record, row):
     return _with_section(record, section.lent(scene.section, record, row, (nan,)))
@@ -269,25 +264,15 @@ def _observe(scene, record, t, duration, stuck, seen):
     )
 
 
-@hook(absorb=True, optional=True)
+@feature("r.last.place", of=BristleBelt, absorb=True)
 def _place(scene, r, place):
     """Place to remember, m: without bristles none is needed."""
-    return r.last.place
-
-
-@_place.implements(BristleBelt)
-def _same_place(scene, r, place):
     return place
 
 
-@hook(absorb=True, optional=True)
+@feature("False", of=BristleBelt, absorb=True)
 def _leaves(scene, r, place):
     """Whether the body leaves the play of the bristles, after stick has ended; never without bristles."""
-    return False
-
-
-@_leaves.implements(BristleBelt)
-def _leaves_play(scene, r, place):
     return abs(place - r.stops.slip_from) > _least_slip(r)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import nan
 from typing import NamedTuple
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import feature, inlined
 from ringsweep.models.belt.force import (
     breakaway_force,
     if_force,
@@ -148,17 +148,12 @@ def _switch(scene, mode, guard, t, y):
     return RUNNING, _mode_at_rest(scene, t, x), (x, 0.0)
 
 
-@hook(optional=True)
+@feature("0.0", of=ring.having(belt.OnBelt, "cubic"))
 def _cube_term(body, c, k):
     """Coefficient `k` of the third power of the displacement, from those up to `k` of the displacement.
 
     It is stored, with that of the square; the coefficients before must have been. 0 for a linear spring.
     """
-    return 0.0
-
-
-@_cube_term.implements(*ring.having(belt.OnBelt, "cubic"))
-def _term_of_cube(body, c, k):
     square = cube = 0.0
     for j in range(k + 1):
         square += c[X, j] * c[X, k - j]
@@ -169,14 +164,9 @@ def _term_of_cube(body, c, k):
     return cube
 
 
-@hook(optional=True)
+@feature("K * load", of=ring.having(belt.OnBelt, "normal_stiffness"))
 def _friction_term(body, c, k, K, load):
     """Coefficient `k` of friction from that of the friction per load, K; `load` is the reaction if it is constant."""
-    return K * load
-
-
-@_friction_term.implements(*ring.having(belt.OnBelt, "normal_stiffness"))
-def _term_of_friction(body, c, k, K, load):
     c[RATIO, k] = K
     c[NORMAL, k] = ring.held(body, 1.0 if k == 0 else 0.0, (c[X, k], 0.0, 0.0), 0.0, 0.0, 0.0)[0]
     friction = 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import nan
 from typing import NamedTuple
 
-from ringsweep.compile import feature, hook, inlined, replacing
+from ringsweep.compile import feature, inlined, replacing
 from ringsweep.physics.friction import Smooth
 
 # A change of the acceleration below this share of its size, or of a jump, is an error of the method.
@@ -69,14 +69,9 @@ def enter(shocks, t, seen):
     return without_event(shocks, seen)
 
 
-@hook(optional=True)
+@feature("shocks", of=Smooth)
 def without_jump(law_family, shocks):
     """Shocks after an event at which no coefficient of friction changes: under a smooth law nothing jumps there."""
-    return shocks
-
-
-@without_jump.implements(Smooth)
-def _without_jump(law_family, shocks):
     return _with_acceleration(shocks, nan)
 
 

@@ -5,7 +5,7 @@ A *cycle* is a period of the drive. States that differ by full turns of the body
 
 from __future__ import annotations
 
-from math import floor, inf, nan, pi
+from math import inf, nan, pi
 from typing import Any, NamedTuple
 
 from ringsweep.compile import feature, generated, replacing
@@ -68,12 +68,6 @@ class LongRun(NamedTuple):
 
 #: Long run with another tangent, and with another section.
 with_tangent, _with_section = replacing("tangent"), replacing("section")
-
-
-@cycles.difference.implements(Ring, BristleRing)
-def _without_full_turns(scene, x, other):
-    apart = x - other
-    return apart - 2.0 * pi * floor(apart / (2.0 * pi) + 0.5)
 
 
 @feature("()")
