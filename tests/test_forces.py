@@ -421,7 +421,7 @@ class TestAudit:
                 longest, _ = series.expand(scene, mode, 0.2 + late, y, 1e-10, c)
             h = 0.5 * longest
             step = Step(mode, False, 0.2, h, y, series.state_at(scene, c, h))
-            scratch = scratch_for(1, 2, 0)._replace(c=c)
+            scratch = scratch_for(1, 0)._replace(c=c)
             found = audit_step(SetValued(), scene, step, scratch, 1e-10, Audit(0.0, 0.0, 0.0))
             audits.append((found.violation, abs(found.unexplained) / found.turnover))
         (violation, share), (wrong_violation, wrong_share) = audits
