@@ -20,6 +20,7 @@ from ringsweep.errors import InputError
 from ringsweep.numerics.series import ORDER
 from ringsweep.numerics.terms import COLUMNS, FACTOR_ROWS, MOST_GROUPS, inner_products, no_factors, set_factors
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of
+from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.physics.friction.velocity import (
     begin_series,
     friction_at,
@@ -248,6 +249,19 @@ class TestPublishedFormula:
             expected = friction_in(found.law, region, now, surfaces)[:2]
             off = 1e-13 + 20 * np.spacing(now) / found.length
             assert np.polynomial.polynomial.polyval(s, series.T) == pytest.approx(expected, abs=off), found
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["exp(-v/w)", "log(2 + v/w)", "sqrt(1 + v/w)", "tanh(v/w - 1)/9", "atan(2*(v/w - 1))/9", "(1 + v/w)**-0.3"],
+)
+def test_series_of_a_function_is_that_function_at_the_moved_speed(text):
+    law = made(define(Definition(f"mu_k*(1 + {text})/2", at_rest="mu_s")), w=0.7)
+    moving = np.array([0.2, 0.3, -0.1, 0.05] + [0.0] * (ORDER - 3))
+    coefficients = series_of_friction(law, region_at(law, 0.2), (MU_S, MU_K), moving)
+    for s in (0.05, 0.1):
+        speed = np.polyval(moving[::-1], s)
+        assert np.polyval(coefficients[0, ::-1], s) == pytest.approx(mu(law, speed), rel=1e-13)
 
 
 class TestRegions:

@@ -145,26 +145,34 @@ def power(a: Node, exponent: Node) -> Node:
     return function("sqrt", a) if exponent.kind == "number" and exponent.value == 0.5 else _node("power", a, exponent)
 
 
-_FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "exp": math.exp,
-    "log": math.log,
-    "sqrt": math.sqrt,
-    "tanh": math.tanh,
-    "atan": math.atan,
-    "log1p": math.log1p,
-    "sin": math.sin,
-    "cos": math.cos,
-}
-
-
 def function(name: str, a: Node) -> Node:
     """Function of an expression: a key of the table above."""
     if a.kind == "number":
         try:
-            return number(_FUNCTIONS[name](a.value))
+            return number(FUNCTIONS[name][0](a.value))
         except (ValueError, OverflowError):
             return number(math.nan)
     return _node(name, a)
+
+
+#: Functions of one expression x: the value for a number, and the derivative from the function f and x, as a quotient.
+#: All series follow from it: dividend and divisor n and q with ``q df = n dx``.
+FUNCTIONS: dict[str, tuple[Callable[[float], float], Callable[[Node, Node], tuple[Node, Node]]]] = {
+    "exp": (math.exp, lambda f, x: (f, ONE)),
+    "log": (math.log, lambda f, x: (ONE, x)),
+    "sqrt": (math.sqrt, lambda f, x: (number(0.5), f)),
+    "tanh": (math.tanh, lambda f, x: (add(ONE, negative(multiply(f, f))), ONE)),
+    "atan": (math.atan, lambda f, x: (ONE, add(ONE, multiply(x, x)))),
+    "log1p": (math.log1p, lambda f, x: (ONE, add(ONE, x))),
+    "sin": (math.sin, lambda f, x: (function("cos", x), ONE)),
+    "cos": (math.cos, lambda f, x: (negative(function("sin", x)), ONE)),
+}
+
+
+@cache
+def quotient_of(a: Node) -> tuple[Node, Node]:
+    """Dividend and divisor of the derivative of a function, or of a power, by its argument."""
+    return (multiply(a.parts[1], a), a.parts[0]) if a.kind == "power" else FUNCTIONS[a.kind][1](a, a.parts[0])
 
 
 def extreme(kind: str, a: Node, b: Node) -> Node:
@@ -192,25 +200,10 @@ def derivative(a: Node) -> Node:
         return add(multiply(rates[0], p[1]), multiply(p[0], rates[1]))
     if a.kind == "divide":
         return divide(add(rates[0], negative(multiply(a, rates[1]))), p[1])
-    if a.kind == "power":
-        return multiply(multiply(p[1], divide(a, p[0])), rates[0])
-    if a.kind == "exp":
-        return multiply(a, rates[0])
-    if a.kind == "log":
-        return divide(rates[0], p[0])
-    if a.kind == "sqrt":
-        return divide(multiply(number(0.5), rates[0]), a)
-    if a.kind == "tanh":
-        return multiply(add(ONE, negative(multiply(a, a))), rates[0])
-    if a.kind == "atan":
-        return divide(rates[0], add(ONE, multiply(p[0], p[0])))
-    if a.kind == "log1p":
-        return divide(rates[0], add(ONE, p[0]))
-    if a.kind == "sin":
-        return multiply(function("cos", p[0]), rates[0])
-    if a.kind == "cos":
-        return multiply(negative(function("sin", p[0])), rates[0])
-    return switch(a.value, *rates)
+    if a.kind == "switch":
+        return switch(a.value, *rates)
+    dividend, divisor = quotient_of(a)
+    return divide(multiply(dividend, rates[0]), divisor)
 
 
 def substitute(a: Node, values: Mapping[Node, Node]) -> Node:
@@ -256,7 +249,7 @@ def rebuilt(node: Node, parts: list[Node]) -> Node:
         return simple[node.kind](*parts)
     if node.kind in ("minimum", "maximum"):
         return extreme(node.kind, *parts)
-    if node.kind in _FUNCTIONS:
+    if node.kind in FUNCTIONS:
         return function(node.kind, *parts)
     return switch(node.value, *parts) if node.kind == "switch" else node
 

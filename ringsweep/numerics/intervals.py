@@ -18,7 +18,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.numerics.expressions import ONE, ZERO, Node, negative, nodes_of, number
+from ringsweep.numerics.expressions import (
+    ONE,
+    SPEED,
+    ZERO,
+    Node,
+    negative,
+    nodes_of,
+    number,
+    quotient_of,
+    rebuilt,
+    symbol,
+)
 from ringsweep.numerics.expressions import add as plus
 from ringsweep.numerics.expressions import multiply as times
 
@@ -229,13 +240,12 @@ def _replaced(a: Interval | None, where: Any, value: float) -> Interval | None:
     return a if a is None else Interval(np.where(where, value, a.low), np.where(where, value, a.high), a.partial)
 
 
-def _times(a: Interval | None, k: float) -> Interval | None:
+def _scaled(a: Interval | None, k: float) -> Interval | None:
     return a if a is None or k == 1.0 else scaled(a, k)
 
 
 def _series_of(node: Node, parts: list[Series], order: int) -> Series:
     a = parts[0]
-    numbers = range(1, order + 1)
     if node.kind == "add":
         return [_sum([x, y]) for x, y in zip(*parts, strict=True)]
     if node.kind == "multiply":
@@ -243,59 +253,42 @@ def _series_of(node: Node, parts: list[Series], order: int) -> Series:
     if node.kind == "divide":
         return _quotient_series(a, parts[1])
     inner = a[0] if a[0] is not None else exact(0.0)
-    if node.kind == "exp":
-        found: Series = [_exp(inner)]
-        for k in numbers:
-            rate = _sum([_product(_times(a[j], j), found[k - j]) for j in range(1, k + 1)])
-            found.append(_over(rate, k))
-        overflows = inner.low > _LARGEST_EXPONENT
-        return [_replaced(c, overflows, 0.0 if k else _HUGE) for k, c in enumerate(found)] if overflows.any() else found
-    if node.kind == "tanh":
-        found = [_tanh(inner)]
-        decay: Series = [_decay(inner)]
-        for k in numbers:
-            rate = _sum([_product(_times(a[j], j), decay[k - j]) for j in range(1, k + 1)])
-            found.append(_over(rate, k))
-            decay.append(_minus(_product_series(found, found)[k]))
-        return found
-    if node.kind == "sqrt":
-        root = _sqrt(inner)
-        found = [root]
-        per = inverse(scaled(root, 2.0)) if any(c is not None for c in a[1:]) else None
-        for k in numbers:
-            rest = _sum([_product(found[j], found[k - j]) for j in range(1, k)])
-            found.append(_product(_sum([a[k], _minus(rest)]), per))
-        return found
-    if node.kind == "atan":
-        divisor = _product_series(a, a)
-        divisor[0] = add(exact(1.0), divisor[0]) if divisor[0] is not None else exact(1.0)
-        found = [_atan(inner)]
-        per = inverse(divisor[0] or exact(1.0))
-    elif node.kind == "log":
-        found, divisor, per = [_log(inner)], a, inverse(inner)
-    else:
-        return _power_series(a, parts[1][0], inner, order)
-    for k in numbers:
-        rest = _sum([_product(_times(found[j], j), divisor[k - j]) for j in range(1, k)])
-        found.append(_product(_sum([a[k], _minus(_over(rest, k))]), per))
+    found: Series = [_VALUES[node.kind](inner, *(part[0] or exact(0.0) for part in parts[1:]))]
+    function = rebuilt(node, list(_ARGUMENTS[: len(parts)]))
+    above, below = quotient_of(function)
+    known = {function: found, **dict(zip(_ARGUMENTS, parts, strict=False))}
+    for k in range(1, order + 1):
+        n, q = _among(above, known, k - 1), _among(below, known, k - 1)
+        if node.kind == "tanh":
+            n[0] = _decay(inner)
+        assert q[0] is not None
+        rate = _sum([_product(_scaled(a[j], j), n[k - j]) for j in range(1, k + 1)])
+        rest = _sum([_product(_scaled(found[j], j), q[k - j]) for j in range(1, k)])
+        term = _over(_sum([rate, _minus(rest)]), k)
+        found.append(term if below is ONE else _product(term, inverse(q[0])))
+    if node.kind == "exp" and (overflows := inner.low > _LARGEST_EXPONENT).any():
+        return [_replaced(c, overflows, 0.0 if k else _HUGE) for k, c in enumerate(found)]
     return found
+
+
+# What stands for the argument of a function, and for the exponent of a power.
+_ARGUMENTS = SPEED, symbol("exponent")
+
+#: Values of functions on an interval.
+_VALUES = {"exp": _exp, "tanh": _tanh, "atan": _atan, "sqrt": _sqrt, "log": _log, "power": _power}
+
+
+def _among(node: Node, known: Mapping[Node, Series], order: int) -> Series:
+    """Power series of an expression of nodes that have series, up to a power that all of them have."""
+    if node in known:
+        return known[node][: order + 1]
+    if node.kind == "number":
+        return [exact(node.value), *[None] * order]
+    return _series_of(node, [_among(part, known, order) for part in node.parts], order)
 
 
 def _over(a: Interval | None, k: int) -> Interval | None:
     return a if a is None or k == 1 else _outward(a.low / k, a.high / k, a.partial)
-
-
-def _power_series(a: Series, exponent: Interval | None, inner: Interval, order: int) -> Series:
-    exponent = exact(0.0) if exponent is None else exponent
-    found: Series = [_power(inner, exponent)]
-    per = inverse(inner)
-    for k in range(1, order + 1):
-        terms = []
-        for j in range(1, k + 1):
-            weight = add(scaled(exponent, float(j)), exact(float(j - k)))
-            terms.append(_product(_product(weight, a[j]), found[k - j]))
-        found.append(_product(_over(_sum(terms), k), per))
-    return found
 
 
 # Polynomials with more coefficients are not multiplied out.

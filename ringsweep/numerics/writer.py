@@ -18,19 +18,19 @@ from dataclasses import dataclass, field
 from functools import cache, partial
 
 from ringsweep.numerics.expressions import (
-    ONE,
+    FUNCTIONS,
     TIME,
     ZERO,
     Node,
-    add,
     derivative,
     frequency,
     multiply,
     nodes_of,
     number,
+    quotient_of,
 )
 
-_CALLS = ("exp", "log", "sqrt", "power", "tanh", "atan")
+_FUNCTIONS = {*FUNCTIONS, "power"}
 
 _OPERATORS = {"add": "+", "multiply": "*", "divide": "/"}
 
@@ -206,7 +206,7 @@ def _calls(parts: list[Node], known: Mapping[Node, str]) -> bool:
     return any(
         node.varies
         and node not in known
-        and (node.kind in _CALLS or (node.kind != "switch" and _calls(list(node.parts), known)))
+        and (node.kind in _FUNCTIONS or (node.kind != "switch" and _calls(list(node.parts), known)))
         for node in parts
     )
 
@@ -317,11 +317,16 @@ def _begin(writer: _Writer, step: _Step, outputs: list[Node], side: str) -> None
         _branch(writer, switches, side.format(threshold), partial(_begin, writer, step, side=side))
         for node in switches:
             _keep(writer, step, node, side)
-    before = set(writer.known)
+    before, nodes = set(writer.known), nodes_of(*outputs)
     _straight(writer, outputs)
-    for node in nodes_of(*outputs):
+    for node in nodes:
         if node in writer.known and node not in before:
             _keep(writer, step, node, side)
+            parts = quotient_of(node) if node.varies and node.kind in _FUNCTIONS else ()
+            for part in parts:
+                _straight(writer, [part])
+                if part not in nodes and node.kind != "tanh":
+                    _keep(writer, step, part, side)
 
 
 def _keep(writer: _Writer, step: _Step, node: Node, side: str) -> None:
@@ -331,16 +336,11 @@ def _keep(writer: _Writer, step: _Step, node: Node, side: str) -> None:
         writer.write(f"{step.needed[node, 'value']} = {value}")
     if (node, "inverse") in step.needed:
         writer.write(f"{step.needed[node, 'inverse']} = 1.0 / {value}")
-    if (node, "half_inverse") in step.needed:
-        writer.write(f"{step.needed[node, 'half_inverse']} = 0.5 / {value}")
-    if (node, "rest") in step.needed:
+    if node.kind == "tanh" and (rest := (quotient_of(node)[0], "value")) in step.needed:
         # 1 - tanh^2 without cancellation.
         decayed = writer.new(f"exp_of(-2.0 * abs({writer.known[node.parts[0]]}))")
         share = writer.new(f"1.0 + {decayed}")
-        writer.write(f"{step.needed[node, 'rest']} = 4.0 * {decayed} / ({share} * {share})")
-    if (node, "one_plus_square") in step.needed:
-        part = writer.known[node.parts[0]]
-        writer.write(f"{step.needed[node, 'one_plus_square']} = 1.0 / (1.0 + {part} * {part})")
+        writer.write(f"{step.needed[rest]} = 4.0 * {decayed} / ({share} * {share})")
     if node.varies and node.kind in ("exp", "tanh"):
         scale = 2.0 if node.kind == "tanh" else 1.0
         _sharpen(writer, node.parts[0], "1.0", scale, side)
@@ -353,13 +353,12 @@ def _keep(writer: _Writer, step: _Step, node: Node, side: str) -> None:
 
 def singular(node: Node) -> Node | None:
     """Expression at whose zeros a node has no power series."""
-    if node.kind == "log1p":
-        return add(ONE, node.parts[0])
     if node.kind == "divide":
         return node.parts[1]
-    if node.kind == "atan":
-        return add(ONE, multiply(node.parts[0], node.parts[0]))
-    return node.parts[0] if node.kind in ("log", "sqrt", "power") else None
+    if node.kind not in _FUNCTIONS:
+        return None
+    divisor = quotient_of(node)[1]
+    return node.parts[0] if divisor is node else divisor
 
 
 def _sharpen(writer: _Writer, inner: Node, unit: str, scale: float, side: str) -> None:
@@ -389,14 +388,17 @@ def _series(step: _Step, outputs: list[Node], side: str) -> None:
         step.free = most
         step.known.update(zip(switches, targets, strict=True))
 
-    def visit(node: Node) -> None:
-        if node.varies and node not in step.known:
-            for part in node.parts:
-                visit(part)
-            step.known[node] = _coefficient(step, node)
-
     for output in outputs:
-        visit(output)
+        _visit(step, output)
+
+
+def _visit(step: _Step, node: Node) -> str:
+    """Name of coefficient k of a node; its parts are written first."""
+    if node.varies and node not in step.known:
+        for part in node.parts:
+            _visit(step, part)
+        step.known[node] = _coefficient(step, node)
+    return step.known.get(node, "0.0")
 
 
 def _coefficient(step: _Step, node: Node) -> str:
@@ -423,33 +425,20 @@ def _coefficient(step: _Step, node: Node) -> str:
         text = f"{step.begun(node)} * {k[1]} + inner[{i}]"
         found = step.new(f"({dividend}({text})) * {step.begun(p[1], 'inverse')}")
         step.factors(i, found, k[1])
-    elif node.kind == "exp":
-        found = step.new(f"{k[0]} * {step.begun(node)} + INVERSE[k] * inner[{i}]")
-        step.factors(i, f"k * {k[0]}", found)
-    elif node.kind == "log":
-        found = step.new(f"({k[0]} - INVERSE[k] * inner[{i}]) * {step.begun(p[0], 'inverse')}")
-        step.factors(i, f"k * {found}", k[0])
-    elif node.kind == "sqrt":
-        found = step.new(f"({k[0]} - inner[{i}]) * {step.begun(node, 'half_inverse')}")
-        step.factors(i, found, found)
-    elif node.kind == "power":
-        j, exponent, inverse = step.product(), step.begun(p[1]), step.begun(p[0], "inverse")
-        rest = f"INVERSE[k] * ({exponent} * inner[{i}] - inner[{j}])"
-        found = step.new(f"({exponent} * {k[0]} * {step.begun(node)} + {rest}) * {inverse}")
-        step.factors(i, f"k * {k[0]}", found)
-        step.factors(j, f"k * {found}", k[0])
-    elif node.kind == "tanh":
-        j = step.product()
-        found = step.new(f"{k[0]} * {step.begun(node, 'rest')} + INVERSE[k] * inner[{i}]")
-        rest = step.new(f"-2.0 * {step.begun(node)} * {found} - inner[{j}]")
-        step.factors(i, f"k * {k[0]}", rest)
-        step.factors(j, found, found)
-    else:
-        j = step.product()
-        square = step.new(f"2.0 * {step.begun(p[0])} * {k[0]} + inner[{i}]")
-        found = step.new(f"({k[0]} - INVERSE[k] * inner[{j}]) * {step.begun(node, 'one_plus_square')}")
-        step.factors(i, k[0], k[0])
-        step.factors(j, f"k * {found}", square)
+        return found
+    # The rate of a function, times the divisor of its derivative, is the rate of its argument times the dividend.
+    above, below = quotient_of(node)
+    text = f"{step.begun(above)} * {k[0]}"
+    if above.varies:
+        text += f" + INVERSE[k] * inner[{i}]"
+    j = step.product() if above.varies and below.varies else i
+    if below.varies:
+        text = f"({text} - INVERSE[k] * inner[{j}]) * {step.begun(below, 'inverse')}"
+    found = step.known[node] = step.new(text)
+    if above.varies:
+        step.factors(i, f"k * {k[0]}", _visit(step, above))
+    if below.varies:
+        step.factors(j, f"k * {found}", _visit(step, below))
     return found
 
 
@@ -460,8 +449,6 @@ _MOST_DEGREE = 4
 
 #: Rows of the scratch for :func:`taylor_lines`.
 SERIES_ROWS = 36
-
-_FUNCTIONS = ("exp", "log", "log1p", "sqrt", "power", "tanh", "atan", "sin", "cos")
 
 
 @cache
