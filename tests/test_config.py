@@ -598,7 +598,9 @@ def test_units_in_the_header_of_a_table_are_converted(write):
         (["0.1, 0", "0.2, 0", "0.3, 0", "0.4, 0"], "t, theta", 2, "begins at 0.1 s"),
         (ROWS[:3], "t, theta", None, "too few"),
         (ROWS, "t, phi", None, "columns t, theta"),
-        (ROWS, "t, t", 1, "name of another column"),
+        (ROWS, "t (s), theta (V)", 1, "the unit 'V' does not fit: angle of the drive is in rad"),
+        (ROWS, "t, theta deg", 1, "column 'theta deg': a name is expected, and behind it the unit in brackets"),
+        (ROWS, "t, t", 1, "two columns have the name t"),
     ],
 )
 def test_error_in_a_table_names_its_line(write, rows, header, line, problem):
@@ -607,6 +609,14 @@ def test_error_in_a_table_names_its_line(write, rows, header, line, problem):
     assert problem in error.problem
     if line is not None:
         assert (error.file, error.line) == (str(file), line)
+
+
+def test_unknown_key_of_an_unfinished_scene_lists_those_of_its_drive():
+    error = refusal(read_scene, {"model": "ring", "drive": {"law": "arctan", "bogus": 3}})
+    assert (error.path, error.problem) == (
+        "scene.drive.bogus",
+        "unknown key; did you mean `amplitude`? (known: law, amplitude)",
+    )
 
 
 def test_table_shorter_than_the_run_is_refused(write):

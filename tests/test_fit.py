@@ -147,6 +147,10 @@ class TestCommand:
         (message,) = capsys.readouterr().err.strip().splitlines()
         assert "run.csv" in message
         assert "line 3" in message or ":3" in message
+        (tmp_path / "run.csv").write_text("t,x\n0.1,0.2\n0.2,0.3\n")
+        assert cli.main([*line[:-1], "friction.mu_x"]) == 2
+        assert "did you mean `friction.mu_s`?" in (message := capsys.readouterr().err)
+        assert "LOW..HIGH" not in message
 
     def test_without_lmfit_one_line_says_how_to_get_it(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "lmfit", None)

@@ -87,7 +87,7 @@ class TestThreshold:
             assert f"riding begins at body.mass = {mass}" in said
             assert f"scan: 5 runs from {ends}" in said
         assert cli.main([*asked, "--unit", "rpm"]) == 2
-        assert "unit: 'rpm' does not fit: body.mass is in kg" in capsys.readouterr().err
+        assert "unit: the unit 'rpm' does not fit: body.mass is in kg" in capsys.readouterr().err
         assert cli.main(["run", str(config), "-o", str(tmp_path / "belt.nc")]) == 0
         assert cli.main(["info", str(tmp_path / "belt.nc")]) == 0
         assert "body_mass: 1000 to 2000 g" in capsys.readouterr().out

@@ -358,7 +358,8 @@ class _Keys:
                     places = places or f"`{section}.{key}`".replace("`.", "`")
                     return f": model {other} has {places}, this is model {self.model}"
         near = self
-        if laws and self.moved is not None:
+        if self.moved is not None:
+            laws = laws or dict.fromkeys(MODELS[self.model].laws)
             near = _Keys(self.model, laws, self.own, self.zones[:1], self.moved, (self.moved.drive,))
         known = near.children.get(section, self.children[section])
         numbers = [name for name in known if name != "law"]

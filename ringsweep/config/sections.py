@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import quantity, show, spelled
+from ringsweep.quantities.units import check_unit, quantity, show, spelled
+from ringsweep.quantities.variables import common_unit
 
 #: Largest number of values on an axis or in a table.
 MAX_LENGTH = 1_000_000
@@ -87,7 +88,13 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
     if isinstance(parameter, Choice):
         names = parameter.names
         return np.array([_registered(name, names, f"{where}.{i}", parameter.long_name) for i, name in enumerate(given)])
-    return np.array([quantity(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
+    try:
+        return np.array([quantity(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
+    except InputError:
+        # A column has its unit in its header.
+        if len(given) > 1 and (unit := common_unit(value for value in given if isinstance(value, str))):
+            check_unit(unit, parameter, where)
+        raise
 
 
 def _registered(given: object, known: Iterable[str], path: str, what: str) -> str:

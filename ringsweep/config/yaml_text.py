@@ -119,8 +119,11 @@ class Document:
             columns: dict[str, tuple[str, list[Any]]] = {}
             for cell in header:
                 name, unit = name_and_unit(cell)
-                if not name or name in columns:
-                    raise wrong(f"column {show(cell)} has no name, or the name of another column")
+                if not name:
+                    form = "a name is expected, and behind it the unit in brackets: phi (deg)"
+                    raise wrong(f"column {show(cell.strip())}: {form}")
+                if name in columns:
+                    raise wrong(f"two columns have the name {name}")
                 columns[name] = unit, []
             if not columns:
                 raise wrong("the file is empty")

@@ -86,6 +86,15 @@ def quantity(value: Any, parameter: Parameter, path: str) -> float:
     raise InputError(path, f"{shown} is not allowed: {parameter.long_name} must be {parameter.interval}{unit}")
 
 
+def check_unit(unit: str, parameter: Parameter, path: str) -> None:
+    """Refuse a unit in which a number cannot be given."""
+    try:
+        _convert(f"1 {unit}", parameter, path)
+    except InputError:
+        fits = f"is in {parameter.unit}" if parameter.unit not in ("", "1") else "has no unit"
+        raise InputError(path, f"the unit {unit!r} does not fit: {parameter.long_name} {fits}") from None
+
+
 def is_quantity(value: Any) -> bool:
     """Whether a value is a quantity of pint, from whatever registry."""
     return all(hasattr(value, name) for name in ("magnitude", "units", "to_root_units"))

@@ -17,7 +17,7 @@ from ringsweep.config.axes import Axes, dimension, sweep_section, swept_paramete
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
-from ringsweep.quantities.units import quantity, show, spelled
+from ringsweep.quantities.units import check_unit, quantity, show, spelled
 from ringsweep.quantities.variables import QUANTILE_ENDS, common_unit, in_unit, words, written_unit
 from ringsweep.runs.boundaries import bisect, check_word, located, run_points, word_in
 from ringsweep.runs.executors import Execution
@@ -122,10 +122,7 @@ def threshold(
         unit = common_unit(given) or written_unit(whole.source, path)
     else:
         si = sweepable(whole.scene)[path].attributes["units"]
-        try:
-            quantity(f"1 {unit}", Parameter(si, path), "unit")
-        except InputError:
-            raise InputError("unit", f"{unit!r} does not fit: {path} is in {si}") from None
+        check_unit(unit, Parameter(si, path), "unit")
     values, allowed = _scan(whole, path, ends, tolerance, scan)
     if whole.sample is not None:
         found = distribution(whole, path, regime, values, allowed, jobs=jobs)
