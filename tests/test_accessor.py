@@ -14,6 +14,7 @@ import ringsweep
 from ringsweep import plots
 from ringsweep.config import load
 from ringsweep.errors import InputError
+from ringsweep.plots.datasets import scene_text
 from ringsweep.runs.plans import plan_of
 from ringsweep.runs.thresholds import in_words
 
@@ -157,6 +158,12 @@ def mapped(scene, axes, points=False):
     plan = plan_of(config)
     coords, attrs = plan.coordinates(), plan.attributes()
     return xr.Dataset(coords=coords, attrs=attrs)
+
+
+def test_picture_of_a_scene_of_plain_numbers_has_their_units(scene):
+    plain = scene | {"zone": {"half_angle": np.pi / 12}, "drive": {"law": "arctan", "amplitude": 2.0}}
+    ds = mapped(plain, {"friction.rough.mu_k": [0.1, 0.3]})
+    assert scene_text(ds) == ["stiction", "drive arctan", "amplitude 2 rad/s", "zone ±15°", "span 4 s"]
 
 
 class TestCell:

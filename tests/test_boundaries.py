@@ -164,6 +164,7 @@ class TestBoundary:
         assert told["rad s"] == pytest.approx(tolerance, rel=0.05)
         netcdf.save(ds, tmp_path / "my.nc")
         assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "separating", "--tolerance", "1e-2"]) == 0
+        assert {path.name for path in tmp_path.iterdir()} == {"my.nc", "my-separating.nc", "my-separating.png"}
         written = netcdf.load(tmp_path / "my-separating.nc")
         assert written.sizes == curves.sizes
         assert cli.main(["info", str(tmp_path / "my-separating.nc")]) == 0

@@ -499,6 +499,20 @@ def test_documentation_names_every_key_law_drive_and_variable():
         assert re.search(rf"`[^`]*\b{re.escape(name)}`", text), name
 
 
+def test_dataset_with_the_suffix_of_another_kind_of_file_is_refused(folder, capsys):
+    for command in (["run", "case.yaml"], ["simulate", "case.yaml"]):
+        assert "is no name of a dataset: name it *.nc" in refused(capsys, *command, "-o", "case.txt")
+
+
+def test_citation_of_an_older_file_has_its_version_model_and_law(capsys):
+    (old,) = (ROOT / "tests" / "data").glob("sweep-0.1.0.nc")
+    assert main(["info", str(old), "--cite"]) == 0
+    first, *others = capsys.readouterr().out.splitlines()
+    assert first == f"ringsweep {netcdf.load(old).attrs['ringsweep_version']}"
+    assert any("Alaci" in line for line in others)
+    assert len(others) == 2
+
+
 def test_json_of_run_and_info_has_the_counts_and_nothing_else_on_stdout(folder, capsys):
     assert main(["run", "case.yaml", "--json", "--jobs", "1"]) == 0
     out, err = capsys.readouterr()

@@ -313,6 +313,16 @@ class TestCheckpoint:
         assert "another ringsweep is computing it" in capsys.readouterr().err
         assert left(target) == []
 
+    def test_sweep_of_another_version_is_told_by_its_version_and_names_do_not_matter(self, config, scene):
+        friction = dict(scene["friction"])
+        own = friction.pop("rest")
+        rest, elsewhere = (
+            identity(load({"scene": scene | {"friction": friction | {name: own}}})) for name in ("rest", "elsewhere")
+        )
+        assert rest == elsewhere
+        older = {name.replace("elsewhere", "rest"): text for name, text in elsewhere.items()} | {"ringsweep": "0.0.9"}
+        assert differences(older, elsewhere).startswith("ringsweep was 0.0.9, is ")
+
     def test_finished_sweep_is_neither_computed_again_nor_replaced_by_another(self, config, never_stopped, tmp_path):
         target = tmp_path / "out.nc"
         shutil.copy(never_stopped, target)

@@ -318,10 +318,14 @@ def info_command(arguments: argparse.Namespace) -> None:
     """
     from ringsweep.storage import netcdf
 
+    # A file without seal is told of where it is read.
     sealed = netcdf.check(arguments.dataset)
     with netcdf.reading(arguments.dataset) as result:
         if arguments.cite:
-            print(result.attrs["references"])
+            from ringsweep.config import load
+            from ringsweep.storage.provenance import references
+
+            print(references(load(arguments.dataset), result.attrs["ringsweep_version"]))
             return
         if arguments.json:
             from ringsweep.cli.report import as_json
@@ -329,7 +333,8 @@ def info_command(arguments: argparse.Namespace) -> None:
             print(as_json(result))
             return
         _print_summary(arguments.dataset, result)
-    print("seal:", "the file is what ringsweep wrote" if sealed else "none, so damage would not be noticed")
+    if sealed:
+        print("seal: the file is what ringsweep wrote")
 
 
 def verify_command(arguments: argparse.Namespace) -> int:
@@ -426,8 +431,8 @@ def _outputs(name: str, mark: str, content: str, inputs: Iterable[str | None] = 
     target = Path(name)
     files.check_writable(target)
     picture = target.with_suffix(".png")
-    if target == picture:
-        raise InputError(name, "is the name of the picture: name the dataset *.nc")
+    if target.suffix.lower() not in (".nc", ".nc4", ".h5", ".hdf5"):
+        raise InputError(name, "is no name of a dataset: name it *.nc; the picture is beside it")
     files.check_writable(picture)
     if target.exists():
         if any(file is not None and target.samefile(file) for file in inputs):

@@ -46,7 +46,8 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         result = attractors(result)
     # The name differs from that of the regime map of the sweep, which must not be replaced.
     shown = None if arguments.var == "regime" else arguments.var
-    target = _picture_of(dataset, arguments.output, shown, *map(_name_part, arguments.sel))
+    bounded = None if arguments.boundaries is None else _name_part(arguments.boundaries)
+    target = _picture_of(dataset, arguments.output, shown, *map(_name_part, arguments.sel), bounded)
     page = target.suffix.lower() == ".html"
     for option, given in (("--log", arguments.log), ("--boundaries", arguments.boundaries)):
         if page and given:
@@ -55,7 +56,7 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         raise InputError("--tolerance", "is that of --boundaries REGIME")
     curves = None
     if arguments.boundaries is not None:
-        written = dataset.with_name(f"{target.stem}-{_name_part(arguments.boundaries)}.nc")
+        written = dataset.with_name(f"{target.stem.removesuffix(f'-{bounded}')}-{bounded}.nc")
         files.check_writable(written)
         if written.exists():
             netcdf.check_kind(written, "vertex", "boundary")

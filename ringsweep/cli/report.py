@@ -84,6 +84,8 @@ def summary(result: xr.Dataset) -> dict[str, list[str]]:
             )
     if "audit" in result.attrs:
         lines.append(f"refined: {result.attrs['audit']}")
+        if "certified" in result and 2 * run > regime.size:
+            lines.append("refining saves little here: a run without it has the numbers of all cells")
     bounds = []
     for name in (str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")):
         known = np.concatenate([part[np.isfinite(part)] for (part,) in parts(result, f"{name}_error")])

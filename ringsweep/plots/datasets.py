@@ -6,6 +6,7 @@ A dataset made by hand has no attributes. So names of dimensions and variables d
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from itertools import chain
 from typing import Any
 
@@ -14,6 +15,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError, nearest_name
+from ringsweep.plots.look import angle_unit
+from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.variables import HISTORY, MODES, configuration_of, swept, written
 
 #: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
@@ -30,15 +33,15 @@ PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
 PIVOT, FLIGHT = 2, 3
 
 
-# What a picture says of a scene: path, the words before its value, and the unit of a plain number.
-_TOLD = (
-    ("friction.law", "", ""),
-    ("drive.law", "drive ", ""),
-    ("drive.amplitude", "amplitude ", ""),
-    ("zone.half_angle", "zone \N{PLUS-MINUS SIGN}", " rad"),
-    ("belt.velocity", "belt ", " m/s"),
-    ("time.span", "span ", " s"),
-)
+# What a picture says of a scene: path, and the words before its value.
+_TOLD = {
+    "friction.law": "",
+    "drive.law": "drive ",
+    "drive.amplitude": "amplitude ",
+    "zone.half_angle": "zone \N{PLUS-MINUS SIGN}",
+    "belt.velocity": "belt ",
+    "time.span": "span ",
+}
 
 
 _NO_SWEEPS = (
@@ -219,12 +222,20 @@ def scene_text(ds: xr.Dataset) -> list[str]:
         return []
     source = configuration_of(ds)
     swept_here = {str(c.attrs["path"]) for c in swept(ds)}
-    values = [(written(source, path), *words) for path, *words in _TOLD if path not in swept_here]
-    return [
-        f"{before}{value:.4g}{after}" if isinstance(value, int | float) else f"{before}{value}"
-        for value, before, after in values
-        if value is not None
-    ]
+    values = {path: written(source, path) for path in _TOLD if path not in swept_here}
+    plain = {path: value for path, value in values.items() if isinstance(value, int | float)}
+    units = dict.fromkeys(plain, "1")
+    if plain:
+        # Only plain numbers need the models, which are slow to import.
+        from ringsweep.config import load, sweepable
+
+        with suppress(InputError):
+            known = sweepable(load(source).scene)
+            units |= {path: getattr(known[path], "unit", "1") for path in plain}
+    for path, value in plain.items():
+        factor, unit = angle_unit() if units[path] == "rad" else (1.0, after_number(units[path]))
+        values[path] = f"{factor * value:.4g}{unit}"
+    return [f"{_TOLD[path]}{value}" for path, value in values.items() if value is not None]
 
 
 def resolve(argument: str, name: str, available: Iterable[Any]) -> str:

@@ -108,6 +108,9 @@ class Axis:
         middles = (at[1:] + at[:-1]) / 2
         edges = np.concatenate([[2 * at[0] - middles[0]], middles, [2 * at[-1] - middles[-1]]])
         edges = np.exp(edges) if self.scale == "log" else edges
+        if self.values[0] >= 0.0:
+            # What has no negative values is not drawn with them.
+            edges[0] = max(edges[0], 0.0)
         between = self.meet[(self.meet > self.values[0]) & (self.meet < self.values[-1])]
         edges[np.searchsorted(self.values, between)] = between
         return edges

@@ -20,9 +20,9 @@ import numpy as np
 
 from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.compile.cache import OWN_FILES
-from ringsweep.config import Config
+from ringsweep.config import Config, as_named
 from ringsweep.models import model_of
-from ringsweep.models.scene import LAW
+from ringsweep.models.scene import ELSEWHERE, LAW
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import TRAITS
 
@@ -72,7 +72,10 @@ def identity(config: Config) -> dict[str, str]:
     formulas = {f"friction.laws.{law}": own.own_law for law, own in scene.structures.items()}
     formulas |= {"drive.theta": structure.own_drive, "force.formula": structure.own_force}
     found |= {f"scene.{path}": str(formula.__doc__) for path, formula in formulas.items() if formula is not None}
-    found |= {f"scene.{path}": repr(float(value)) for path, value in scene.values.items() if path not in axes.columns}
+    for path, value in scene.values.items():
+        if path not in axes.columns:
+            # Numbers are the same, whichever of its two names the friction outside the zones has.
+            found[f"scene.{as_named(path, ELSEWHERE[0])}"] = repr(float(value))
     if structure.exponent:
         found["record.exponent"] = "true"
     if structure.section is not None:
@@ -112,7 +115,7 @@ def fingerprint(identity: Mapping[str, str]) -> str:
 
 def differences(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     """Differences between two identities in words, without digests."""
-    names = [name for name in {**new, **old} if old.get(name) != new.get(name)]
+    names = [name for name in {**environment(), **new, **old} if old.get(name) != new.get(name)]
     if "ringsweep" in names:
         names = [name for name in names if name != "sources"]
     words = [_difference(name, _short(old.get(name)), _short(new.get(name))) for name in names[:_MAX_NAMED]]
@@ -164,10 +167,10 @@ def _own_files(config: Config) -> list[str]:
     return sorted(path.name for path in OWN_FILES if path.stem in {getattr(one, "__module__", "") for one in used})
 
 
-def references(config: Config) -> str:
-    """What a paper that uses a result can cite: the software, the model and the friction laws, a line each."""
+def references(config: Config, of: str | None = None) -> str:
+    """What a paper that uses a result of a version can cite: software, model and friction laws, a line each."""
     laws = (TRAITS[structure.law_type].source for structure in config.scene.structures.values())
-    cited = f"ringsweep {_version('ringsweep')}", model_of(config.scene.structure).reference, *laws
+    cited = f"ringsweep {of or _version('ringsweep')}", model_of(config.scene.structure).reference, *laws
     return "\n".join(dict.fromkeys(filter(None, cited)))
 
 
