@@ -245,10 +245,13 @@ def laws_at(scene: Scene, axes: Axes, indices: Indices, count: int) -> NDArray[n
     return np.asarray(names[tuple(indices[dim] for dim in dims)])
 
 
-def by_law(scene: Scene, axes: Axes, indices: Indices, count: int) -> Iterator[tuple[Structure, NDArray[np.intp]]]:
-    """Which of `count` cells have each friction law: a batch has one law, since each law has kernels of its own."""
+def by_law(
+    scene: Scene, axes: Axes, indices: Indices, count: int
+) -> Iterator[tuple[Structure, NDArray[np.intp], dict[str, NDArray[np.float64]]]]:
+    """Which of `count` cells have each friction law, and their values: a batch has one law, as kernels have."""
     laws = laws_at(scene, axes, indices, count)
     for law, structure in scene.structures.items():
         own = np.flatnonzero(laws == law)
         if len(own):
-            yield structure, own
+            here = {dim: along[own] for dim, along in indices.items()}
+            yield structure, own, values_at(scene, axes, here, len(own))

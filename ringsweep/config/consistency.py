@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ringsweep.config.axes import Axes, by_law, values_at
+from ringsweep.config.axes import Axes, by_law
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Scene
@@ -39,10 +39,9 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
         flat = np.arange(start, min(start + _CELLS_AT_ONCE, total))
         numbers = np.unravel_index(flat, shape)[1:]
         indices = {dim: along[number] for dim, along, number in zip(axes.sizes, checked, numbers, strict=True)}
-        values = values_at(scene, axes, indices, len(flat))
-        for structure, cells in by_law(scene, axes, indices, len(flat)):
+        for structure, _, values in by_law(scene, axes, indices, len(flat)):
             try:
-                made = batch(structure, {path: column[cells] for path, column in values.items()})
+                made = batch(structure, values)
             except InputError as error:
                 error.problem += " (in a cell of the sweep)" if axes.sizes else ""
                 raise

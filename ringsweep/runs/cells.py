@@ -101,13 +101,13 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
     compiles = compiled not in _compiled
     start = perf_counter()
     columns: dict[str, NDArray[Any]] = {}
-    for structure, own in by_law(scene, axes, indices, len(positions)):
+    for structure, own, values in by_law(scene, axes, indices, len(positions)):
         with readable_compile_errors(), _named_if_long(axes, indices, compiles):
-            for cells, found in _runs(config, structure, indices, own):
+            for cells, found in _runs(config, structure, {dim: along[own] for dim, along in indices.items()}, values):
                 # A bound beyond the range of a float of 32 bits is infinite.
                 with np.errstate(over="ignore"):
                     for name, column in found.items():
-                        columns.setdefault(name, _missing(name, len(positions), column))[cells] = column
+                        columns.setdefault(name, _missing(name, len(positions), column))[own[cells]] = column
     seconds = perf_counter() - start
     _compiled.add(compiled)
     # A compilation would count as time of the cells.
@@ -121,18 +121,17 @@ def _missing(name: str, count: int, like: NDArray[Any]) -> NDArray[Any]:
 
 
 def _runs(
-    config: Config, structure: Structure, indices: Indices, own: NDArray[np.intp]
-) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
+    config: Config, structure: Structure, indices: Indices, values: dict[str, NDArray[np.float64]]
+) -> Iterator[tuple[Any, dict[str, NDArray[Any]]]]:
     """Cells of one law that are run side by side, as places in `indices`, and their outcomes."""
-    values = values_at(config.scene, config.axes, {dim: along[own] for dim, along in indices.items()}, len(own))
     if config.follow is None:
-        yield own, _outcomes(config, structure, values)
+        yield slice(None), _outcomes(config, structure, values)
         return
     before = dict[str, NDArray[Any]]()
-    for cells in in_chains(config, {dim: along[own] for dim, along in indices.items()}):
+    for cells in in_chains(config, indices):
         now, held = _started(structure, {path: column[cells] for path, column in values.items()}, before)
         found = _outcomes(config, structure, now)
-        yield own[cells], found | {"started_from": held.astype(np.int8)}
+        yield cells, found | {"started_from": held.astype(np.int8)}
         before = now | found
 
 

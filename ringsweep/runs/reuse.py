@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config, load
-from ringsweep.config.axes import Indices, by_law, values_at
+from ringsweep.config.axes import Indices, by_law
 from ringsweep.errors import InputError
 from ringsweep.models import parameters
 from ringsweep.models.scene import LAW
@@ -141,11 +141,10 @@ class EarlierSweep:
 
     def _locate(self, config: Config, indices: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
         """Which of `count` cells of the new sweep the file holds, and the indices of these in the file."""
-        values = values_at(config.scene, config.axes, indices, count)
         shared = np.zeros(count, dtype=bool)
         in_file = {dim: np.zeros(count, dtype=np.intp) for dim in self.axes.sizes}
-        for structure, own in by_law(config.scene, config.axes, indices, count):
-            needed = {path: values[path][own] for path in parameters(structure) if path in values}
+        for structure, own, values in by_law(config.scene, config.axes, indices, count):
+            needed = {path: values[path] for path in parameters(structure) if path in values}
             shared[own], found = self._locate_under_law({**needed, LAW: np.full(len(own), structure.law)})
             for dim, along in found.items():
                 in_file[dim][own] = along

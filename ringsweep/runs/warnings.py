@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config
-from ringsweep.config.axes import by_law, values_at
+from ringsweep.config.axes import by_law
 from ringsweep.models import model_of
 from ringsweep.models.cycles import POSITIVE, ZERO
 from ringsweep.models.model import Continues
@@ -105,8 +105,7 @@ def _hint_at_a_torus(results: xr.Dataset, config: Config) -> str:
         cells = np.flatnonzero(known)
         indices = dict(zip(axes.sizes, layout.indices(start + cells), strict=True))
         start += regime.size
-        for structure, own in by_law(scene, axes, indices, len(cells)):
-            values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
+        for structure, own, values in by_law(scene, axes, indices, len(cells)):
             model = model_of(structure)
             assert isinstance(model, Continues)
             change = (abs(rate) + POSITIVE * error).flat[cells[own]] * model.forcing_period(structure, values)
