@@ -63,17 +63,15 @@ class TestTaskSizes:
     def test_task_takes_a_hundredth_of_the_time_spent_within_bounds(self):
         sizes = TaskSizes(1, lambda: 2)
         assert sizes.next(10**9) == 1
+        # However fast the first one was, the second is at most eight times as large.
+        sizes.learn(FinishedTask(1, 1e-6))
+        assert sizes.next(10**9) == 8
         sizes.learn(FinishedTask(100, 0.1))
         assert sizes.next(10**9) == 100
         sizes.learn(FinishedTask(99_000, 99.0))
         assert sizes.next(10**9) == pytest.approx(1000, rel=0.02)
         sizes.learn(FinishedTask(10**6, 1e3))
         assert sizes.next(10**9) == pytest.approx(2000, rel=0.02)
-
-    def test_task_is_at_most_eight_times_as_large_as_the_largest_before(self):
-        sizes = TaskSizes(1, lambda: 2)
-        sizes.learn(FinishedTask(1, 1e-6))
-        assert sizes.next(10**9) == 8
 
     def test_sweep_of_a_known_kind_needs_no_small_first_task(self):
         TaskSizes(1, lambda: 1, "a kind of sweep").learn(FinishedTask(64, 0.004))
@@ -101,14 +99,3 @@ class TestTaskSizes:
         assert all(len(task) for task in found)
         if cost > TaskSizes.max_seconds:
             assert {len(task) for task in found} == {1}
-
-
-@pytest.mark.parametrize("total", [1, 40_000])
-def test_tasks_skip_long_runs_of_finished_cells(total):
-    done = np.ones(total + 100_000, dtype=bool)
-    done[-total:] = False
-    sizes = TaskSizes(1, lambda: 1)
-    sizes.learn(FinishedTask(1000, 0.001))
-    np.testing.assert_array_equal(
-        np.concatenate(list(divide_into_tasks(done, sizes, Event()))), np.arange(100_000, 100_000 + total)
-    )

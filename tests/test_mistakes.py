@@ -4,19 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from belts import on_belt
 
 import ringsweep
 from ringsweep import InputError
 from ringsweep.config import load
 
-BELT: dict[str, Any] = {
-    "model": "belt",
-    "body": {"mass": 1.0},
-    "spring": {"stiffness": 2.0},
-    "belt": {"velocity": 0.1},
-    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.05},
-    "time": {"span": 7.0},
-}
+BELT: dict[str, Any] = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.05}, 2.0, velocity=0.1, span=7.0)
 SAMPLE: dict[str, Any] = {"n": 256, "of": {"friction.mu_s": {"normal": [0.15, "10 %"]}}}
 GOOD = {"t": [0.1, 0.2, 0.3, 0.4], "x": [0.01, 0.02, 0.03, 0.04]}
 FILES = {

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from belts import on_belt
 
 from ringsweep import cli
 from ringsweep.config import load, with_values
@@ -97,14 +98,7 @@ def test_source_of_a_law_is_on_the_page_of_references(law):
 
 
 def test_file_cites_its_own_model_and_law():
-    belt = {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 2.0},
-        "belt": {"velocity": 0.1},
-        "friction": {"law": "tustin", "mu_s": 0.15, "mu_k": 0.1, "alpha": 1.0},
-        "time": {"span": 1.0},
-    }
+    belt = on_belt({"law": "tustin", "mu_s": 0.15, "mu_k": 0.1, "alpha": 1.0}, 2.0, velocity=0.1, span=1.0)
     cited = references(with_values({"scene": belt}))
     assert "Tustin" in cited
     assert "Popp" in cited

@@ -46,19 +46,17 @@ def taken(scene, axes, earlier, tmp_path, caplog, **options):
     return int(line.split()[0])
 
 
-def test_finer_grid_takes_its_shared_cells(scene, earlier, tmp_path, caplog):
-    finer = {"drive.amplitude": np.linspace(0.5, 4.5, 9), "zone.half_angle": WIDTHS}
-    assert taken(scene, finer, earlier, tmp_path, caplog) == 15
-
-
-def test_wider_grid_in_another_order_takes_its_shared_cells(scene, earlier, tmp_path, caplog):
-    wider = {"zone.half_angle": [np.radians(25.0), *WIDTHS[::-1]], "drive.amplitude": [9.0, *AMPLITUDES[1:]]}
-    assert taken(scene, wider, earlier, tmp_path, caplog) == 12
-
-
-def test_grid_with_another_axis_takes_cells_at_the_value_of_the_scene(scene, earlier, tmp_path, caplog):
-    further = {"drive.amplitude": AMPLITUDES[:2], "initial.omega": [0.0, 1.0], "zone.half_angle": WIDTHS}
-    assert taken(scene, further, earlier, tmp_path, caplog) == 6
+@pytest.mark.parametrize(
+    ("axes", "cells"),
+    [
+        ({"drive.amplitude": np.linspace(0.5, 4.5, 9), "zone.half_angle": WIDTHS}, 15),
+        ({"zone.half_angle": [np.radians(25.0), *WIDTHS[::-1]], "drive.amplitude": [9.0, *AMPLITUDES[1:]]}, 12),
+        ({"drive.amplitude": AMPLITUDES[:2], "initial.omega": [0.0, 1.0], "zone.half_angle": WIDTHS}, 6),
+    ],
+    ids=["finer", "wider in another order", "another axis through the value of the scene"],
+)
+def test_grid_takes_the_cells_that_it_shares(scene, earlier, tmp_path, caplog, axes, cells):
+    assert taken(scene, axes, earlier, tmp_path, caplog) == cells
 
 
 def test_line_through_the_earlier_grid_takes_all_its_cells(scene, earlier, tmp_path, caplog):

@@ -45,19 +45,15 @@ def points(ax):
     return [one for one in ax.collections if isinstance(one, PathCollection)]
 
 
-def test_up_and_down_are_points_in_two_colours_that_are_rasterised(diagram):
-    up, down = points(plots.bifurcation_panel(diagram, ax=Figure().subplots()))
+def test_up_and_down_are_points_in_two_colours_that_are_rasterised_under_a_strip_of_regimes(diagram):
+    ax = plots.bifurcation_panel(diagram, ax=Figure().subplots())
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["up", "down", "stick-slip", "oscillatory"]
+    up, down = points(ax)
     assert [to_hex(one.get_facecolor()[0]).upper() for one in (up, down)] == list(PAIR_COLOURS)
     assert set(up.get_offsets()[:, 1]) == {1.0}
     assert set(down.get_offsets()[:, 1]) == {0.0, 2.0}
     assert up.get_rasterized()
     assert down.get_rasterized()
-
-
-def test_regimes_are_a_strip_over_their_part_of_the_axis(diagram):
-    ax = plots.bifurcation_panel(diagram, ax=Figure().subplots())
-    names = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert names == ["up", "down", "stick-slip", "oscillatory"]
 
 
 def test_exponent_and_multipliers_stand_below_on_the_same_axis(diagram):
