@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 from jsonschema import Draft202012Validator
 
 import ringsweep
@@ -302,8 +302,7 @@ def test_unexpected_error_and_interrupt_are_reported_in_one_line(monkeypatch, ca
 @pytest.mark.parametrize(("span", "status"), [("20 s", 0), ("2000 s", 1)])
 @pytest.mark.parametrize("verb", ["run", "simulate"])
 def test_status_is_1_if_every_run_has_failed(folder, capsys, verb, span, status):
-    belt = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}}
-    belt |= {"friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, "time": {"span": span}}
+    belt = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=span)
     few = {"method": "auto", "max_steps": 1000}
     (folder / "belt.yaml").write_text(yaml.safe_dump({"scene": with_all_parts(belt), "solver": few}))
     assert main([verb, "belt.yaml", "-o", "out.nc"]) == status
@@ -370,8 +369,7 @@ def test_environment_that_a_library_refuses_is_told_in_one_line(folder, variable
 
 def crafted(change):
     """A sweep on a belt in a file that ringsweep did not write: `change` takes the dataset."""
-    scene = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}}
-    scene |= {"friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, "time": {"span": 20.0}}
+    scene = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=20.0)
     grid = {"belt.velocity": [0.05, 0.1], "friction.mu_s": [0.12, 0.15, 0.2]}
     names = ("regime", "t_end", "x_end", "x_max", "certified", "steps")
     numbers = np.arange(6.0).reshape(2, 3)

@@ -12,6 +12,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from belts import on_belt
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -42,16 +43,7 @@ LEINE = {"law": "formula", "mu": "mu_s/(1 + delta*v)", "at_rest": "mu_s", "mu_s"
 
 def belt(friction, velocity=0.2, span=30.0, **more):
     """A mass on a belt, with unit mass, stiffness and weight."""
-    return {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 1.0},
-        "belt": {"velocity": velocity},
-        "friction": friction,
-        "gravity": 1.0,
-        "time": {"span": span},
-        **more,
-    }
+    return on_belt(friction, velocity=velocity, gravity=1.0, span=span) | more
 
 
 def formula(mu, at_rest="mu_s", **parameters):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from belts import with_all_parts
+from belts import on_belt, with_all_parts
 from scipy import optimize, special
 
 import ringsweep
@@ -13,16 +13,10 @@ pytestmark = pytest.mark.slow
 
 def oscillator(span, **changes):
     """Den Hartog's oscillator: a mass on a spring under Coulomb friction and a harmonic force; all numbers are 1."""
-    return {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 1.0},
-        "belt": {"velocity": 0.0},
-        "gravity": 1.0,
-        "friction": {"law": "coulomb", "mu_k": 0.5},
-        "force": {"amplitude": 1.0, "frequency": 0.2, "phase": "90 deg"},
-        "time": {"span": span},
-    } | changes
+    return (
+        on_belt({"law": "coulomb", "mu_k": 0.5}, velocity=0.0, gravity=1.0, force=(1.0, 0.2, "90 deg"), span=span)
+        | changes
+    )
 
 
 #: F_s/(1 + delta |v|) on a belt, in a code for optimal control of systems with implicit switches (Bock, Kirches, Meyer,
@@ -77,16 +71,9 @@ def test_steady_motions_have_the_numbers_of_stops_that_hong_and_liu_found():
     assert not settled[stops == 1].any()
 
 
-def on_belt(damping, friction, **changes):
+def damped(damping, friction, **changes):
     """A mass on a spring and a damper under friction that falls with the speed; mass, stiffness and gravity are 1."""
-    return {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": 1.0},
-        "damper": {"coefficient": damping},
-        "gravity": 1.0,
-        "friction": friction,
-    } | changes
+    return on_belt(friction, damping=damping, gravity=1.0) | changes
 
 
 #: Friction of two publications; with all parts of a belt they share a kernel.
@@ -110,7 +97,7 @@ class TestThomsenAndFidlinsAmplitudes:
         velocities = np.array(shares) * onset
         mapping = {
             "scene": with_all_parts(
-                on_belt(2 * damping, law, initial={"x": 0.4, "velocity": 0.0}, time={"span": 3000.0 / small})
+                damped(2 * damping, law, initial={"x": 0.4, "velocity": 0.0}, time={"span": 3000.0 / small})
             ),
             "record": {"exponent": True},
             "sweep": {
@@ -161,7 +148,7 @@ def test_hetzlers_unstable_cycle_bounds_the_basin_of_steady_slip():
             radius = optimize.brentq(lambda z, t=target: 2 * special.iv(1, z) / z - t, 1e-3, 10.0) / alpha
             slip = 0.5 + 0.5 * small * np.exp(-alpha * velocity)
             scene = with_all_parts(
-                on_belt(
+                damped(
                     0.1 * small,
                     law,
                     belt={"velocity": velocity},

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config.sections import one_of, read_values, warn_once
 from ringsweep.config.yaml_text import Document
-from ringsweep.errors import InputError, shortened
+from ringsweep.errors import InputError, nearest_name, shortened
 from ringsweep.quantities.parameters import Parameter
 
 #: Columns of the tables of a measured drive, force and friction curve, by section. The first column ascends.
@@ -100,8 +100,12 @@ def read_table(
         found = doc.inline_csv(given["file"], f"{where}.file", where)
         renamed = {"time" if name == "t" else name: cells for name, cells in found.items()}
         if set(renamed) != set(columns) or len(found) != 2:
-            names = ", ".join("t" if name == "time" else name for name in columns)
-            raise InputError(f"{where}.file", f"columns {names} are expected; got {shortened(', '.join(found), 80)}")
+            names = ["t" if name == "time" else name for name in columns]
+            missing = [name for name in names if name not in found]
+            wrong = {name: nearest_name(name, missing) for name in found if name not in names}
+            hints = [f"; did you mean `{near}` by {shortened(name, 40)}?" for name, near in wrong.items() if near]
+            problem = f"columns {', '.join(names)} are expected; got {', '.join(found)}{''.join(hints[:1])}"
+            raise InputError(f"{where}.file", problem)
         doc.locations |= {k.replace(f"{section}.t.", f"{section}.time."): v for k, v in doc.locations.items()}
         del given["file"]
         given |= renamed
