@@ -7,7 +7,6 @@ quickly.
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import logging
 import sys
 from collections.abc import Callable, Iterable
@@ -205,6 +204,8 @@ def simulate_command(arguments: argparse.Namespace) -> int:
 
 def _single_run(arguments: argparse.Namespace) -> Any:
     """Configuration of the run of a scene, or of a cell of a file, with the values that are set."""
+    from dataclasses import replace
+
     from ringsweep.config import with_values
 
     if not arguments.sel:
@@ -217,7 +218,7 @@ def _single_run(arguments: argparse.Namespace) -> Any:
         raise InputError("--sel", f"names a cell of a result file, and {arguments.config} is none: --set PATH=VALUE")
     with netcdf.reading(arguments.config) as result:
         cell = ringsweep.plots.cell(result, dict(map(selection_of, arguments.sel)))
-    return dataclasses.replace(with_values(cell, arguments.set), name=Path(arguments.config).stem)
+    return replace(with_values(cell, arguments.set), name=Path(arguments.config).stem)
 
 
 def threshold_command(arguments: argparse.Namespace) -> None:
