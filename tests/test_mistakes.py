@@ -121,7 +121,7 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
         "scene.friction.mu_k",
         "not all points of the sample are allowed",
     ),
-    ({"n": -8}, "sweep.sample.n", "-8 is not allowed: number of samples of each cell must be at least 2"),
+    ({"n": -8}, "sweep.sample.n", "-8 is not allowed: points of each cell must be at least 2"),
     ({"quantiles": {"first_slip": 0.5}}, "sweep.sample.quantiles.first_slip", "list of values"),
     ({"quantiles": {"first_slip": [0, 1]}}, "sweep.sample.quantiles.first_slip.0", "greater than 0"),
     ({"sensitivity": {"off": ["x_end"]}}, "sweep.sample.sensitivity", "{of: [t_end]}"),
