@@ -7,7 +7,6 @@ While both contacts hold, the steps are those of the closed ring. In a pivot the
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import NamedTuple
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
@@ -15,7 +14,6 @@ from ringsweep.models.interface.shock import Located
 from ringsweep.models.ring.impact.mode import (
     FIRST,
     NONE,
-    TURNED,
     coefficients_there,
     distances_to_edges,
     frame,
@@ -26,7 +24,8 @@ from ringsweep.models.ring.impact.mode import (
 from ringsweep.models.ring.impact.rows import row_of
 from ringsweep.models.ring.record import sought
 from ringsweep.models.sliding import rate_at_rest
-from ringsweep.physics import drives, pivot, ring
+from ringsweep.numerics.terms import joined
+from ringsweep.physics import drives, pivot
 from ringsweep.physics.friction.velocity import friction_in, region_bounds
 from ringsweep.physics.impact import ImpactRing, inertia
 
@@ -35,34 +34,6 @@ _GAP_TOLERANCE = 1e-2
 
 # A contact that pivots crosses an edge this far behind it, rad, so that it does not cross back by rounding.
 _BEYOND = 1e-12
-
-
-class Motion(NamedTuple):
-    """Motion of the body, and what recorder and history need besides.
-
-    Attributes
-    ----------
-    psi, psi_dot, psi_dd : float
-        Angle, rad, and its derivatives.
-    normal_1, normal_2, gap_1, gap_2 : float
-        Reactions, N, and measures of the gaps, m.
-    code : float
-        Code of the state.
-    determinant, load_1, load_2 : float
-        How near to zero the guards of the same name may come before their roots are looked for.
-    """
-
-    psi: float
-    psi_dot: float
-    psi_dd: float
-    normal_1: float
-    normal_2: float
-    gap_1: float
-    gap_2: float
-    code: float
-    determinant: float
-    load_1: float
-    load_2: float
 
 
 @implicit.to_implicit.implements(ImpactRing)
@@ -166,50 +137,47 @@ def _derivative(scene, f, friction, found, state, forcing):
     return pivot.sliding_acceleration(f, changed, radius * d_epsilon), changed[0] - changed[1]
 
 
+# The motion in a view is what the recorder is shown, and how near to zero the guards may come before their roots are
+# looked for.
+
+
 @implicit.guards_and_motion.implements(ImpactRing)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    body, psi = scene.closed.body, x[0] + forcing[0]
-    if mode.contacts.open == NONE:
-        guards, (_, omega, epsilon, _) = implicit.guards_and_motion(
-            ring_of(scene, mode.contacts.turned), mode, common, forcing, (x[0], x[1])
-        )
-        determinant, slow, normal_1, normal_2, ahead, fast = guards
-        load = 0.05 * body.mass * (body.gravity + body.radius * omega * omega)
-        near = 0.02 * ring.free_determinant(body)
-        found = Motion(psi, omega, epsilon, normal_1, normal_2, 0.0, 0.0, x[4], near, load, load)
-        return (determinant, slow, normal_1, normal_2, ahead, fast), found
+    body, contacts = scene.closed.body, mode.contacts
+    if contacts.open == NONE:
+        closed = ring_of(scene, contacts.turned)
+        view = implicit.guards_and_motion(closed, mode, common, forcing, (x[0], x[1]))
+        return view[0], (joined(implicit.seen(closed, view), (0.0, 0.0, 0.0)), implicit.near_zero(closed, view[1]))
     f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, x[1])
-    (psi_dd, _, normal, _), determinant = pivot.in_slip(f, K), pivot.determinant(f, K)
+    psi_dd, _, normal, _ = pivot.in_slip(f, K)
     gap, speed, (low, high) = gap_measure(scene, mode, x[2]), mode.sign * x[1], region_bounds(scene.law, mode.region)
     above, below = distances_to_edges(scene, mode, f.alpha - forcing[0])
     ahead = (above + _BEYOND) * (below + _BEYOND) if above < inf else inf
     load = 0.05 * body.mass * pivot.size(f)
-    near = 0.02 * inertia(body)
-    if mode.contacts.open == FIRST:
-        found = Motion(psi, f.psi_dot, psi_dd, 0.0, normal, gap, 0.0, x[4], near, 0.0, load)
-        return (determinant, speed - low, gap, normal, ahead, high - speed), found
-    found = Motion(psi, f.psi_dot, psi_dd, normal, 0.0, 0.0, gap, x[4], near, load, 0.0)
-    return (determinant, speed - low, normal, gap, ahead, high - speed), found
+    reactions, gaps, loads, guards = (normal, 0.0), (0.0, gap), (load, 0.0), (normal, gap)
+    if contacts.open == FIRST:
+        reactions, gaps, loads, guards = (0.0, normal), (gap, 0.0), (0.0, load), (gap, normal)
+    acceleration = Located(psi_dd, body.gravity / body.radius + f.psi_square + abs(psi_dd))
+    seen = x[0] + forcing[0], f.psi_dot, *reactions, acceleration, gaps[0], gaps[1], float(contacts.open)
+    near_zero = 0.02 * inertia(body), 0.0, *loads, 0.0, 0.0
+    return (pivot.determinant(f, K), speed - low, *guards, ahead, high - speed), (seen, near_zero)
 
 
 @implicit.near_zero.implements(ImpactRing)
 def _near_zero(scene, motion):
-    return motion.determinant, 0.0, motion.load_1, motion.load_2, 0.0, 0.0
+    return motion[1]
 
 
 @implicit.seen.implements(ImpactRing)
 def _seen(scene, view):
-    m = view[1]
-    size = scene.closed.body.gravity / scene.closed.body.radius + m.psi_dot * m.psi_dot + abs(m.psi_dd)
-    contacts = float(int(m.code + 0.5) % TURNED)
-    return m.psi, m.psi_dot, m.normal_1, m.normal_2, Located(m.psi_dd, size), m.gap_1, m.gap_2, contacts
+    return view[1][0]
 
 
 @implicit.sought.implements(ImpactRing)
 def _sought(scene, record, view):
-    m, most = view[1], record.gap_max
-    closed = sought(record.base, m.psi, m.psi_dot, m.normal_1, m.normal_2)
-    return (*closed, (m.gap_1, 0.0, most), (m.gap_2, 0.0, most))
+    psi, psi_dot, normal_1, normal_2, _, gap_1, gap_2, _ = view[1][0]
+    most = record.gap_max
+    return (*sought(record.base, psi, psi_dot, normal_1, normal_2), (gap_1, 0.0, most), (gap_2, 0.0, most))
 
 
 @implicit.row.implements(ImpactRing)
