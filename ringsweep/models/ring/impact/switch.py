@@ -214,22 +214,25 @@ def _switch(scene, mode, guard, t, y):
         return _after_closed(scene, t, (status, after, (y[0], v, *y[2:])), zeros, False)
     if guard == DETERMINANT:
         return _jammed(scene, mode, y[1]), mode, y
-    reaches_1, reaches_2 = guard == NORMAL_1, guard == NORMAL_2
-    if contacts.open == BOTH:
-        return _lands(scene, mode, 1 if reaches_1 else 2, t, y)
-    if reaches_1 or reaches_2:
-        contact = 1 if reaches_1 else 2
-        if contact != holding(mode):
-            return _lands(scene, mode, contact, t, y)
-        _, ring_omega, _ = drives.turn(scene.drive, t)
-        motion = motion_of(scene, y, ring_omega)
-        if _presses(scene, contact, motion):
-            return JAM, mode, y
-        zeros = _remaining(mode, y, (3, contacts.zeros_2) if contact == 1 else (contacts.zeros_1, 3))
-        opened = opens(contact, contacts.event.number, t)
-        flight = in_flight((mode.place_1, mode.place_2), contacts.turned, zeros, opened)
-        return RUNNING, flight, state_in_flight(motion, contacts.turned, _gaps_in_pivot(scene, mode, y))
-    return _on_one_contact(scene, mode, guard, t, y)
+    if contacts.open != BOTH and guard not in (NORMAL_1, NORMAL_2):
+        return _on_one_contact(scene, mode, guard, t, y)
+    contact = 1 if guard == NORMAL_1 else 2
+    if contacts.open == BOTH or contact != holding(mode):
+        return _lands(scene, mode, contact, t, y)
+    if _presses(scene, contact, motion_of(scene, y, drives.turn(scene.drive, t)[1])):
+        return JAM, mode, y
+    return _takes_off(scene, mode, t, y, 3)
+
+
+@inlined
+def _takes_off(scene, mode, t, y, zeros):
+    """Status, mode and state after the contact that holds in a pivot has opened; `zeros` are those of its gap."""
+    contacts, contact = mode.contacts, holding(mode)
+    both = (zeros, contacts.zeros_2) if contact == 1 else (contacts.zeros_1, zeros)
+    event = opens(contact, contacts.event.number, t)
+    flight = in_flight((mode.place_1, mode.place_2), contacts.turned, _remaining(mode, y, both), event)
+    motion = motion_of(scene, y, drives.turn(scene.drive, t)[1])
+    return RUNNING, flight, state_in_flight(motion, contacts.turned, _gaps_in_pivot(scene, mode, y))
 
 
 @inlined
@@ -290,15 +293,9 @@ def _beyond_nearer_edge(scene, mode, t, y):
 def _begun(scene, t, y, stick, stick_end):
     """Status, mode and state of a pivot whose sliding velocity is zero; it may turn into a flight."""
     status, found = pivot.begun(scene, t, y, stick, stick_end)
-    _, ring_omega, _ = drives.turn(scene.drive, t)
-    contact, contacts = holding(stick), stick.contacts
     # Friction in stick may have pressed the ball against the race: when it drops, the contact opens.
-    if status == JAM and not load(frame(scene, y, ring_omega)) > 0.0:
-        zeros = (2, contacts.zeros_2) if contact == 1 else (contacts.zeros_1, 2)
-        opened = opens(contact, contacts.event.number, t)
-        flight = in_flight((stick.place_1, stick.place_2), contacts.turned, zeros, opened)
-        motion = motion_of(scene, y, ring_omega)
-        return RUNNING, flight, state_in_flight(motion, contacts.turned, _gaps_in_pivot(scene, stick, y))
+    if status == JAM and not load(frame(scene, y, drives.turn(scene.drive, t)[1])) > 0.0:
+        return _takes_off(scene, stick, t, y, 2)
     return status, found, y
 
 
