@@ -5,7 +5,6 @@ from ringsweep.models.ring import audit, bristles, creep, jam, rk4, series, vari
 from ringsweep.models.ring.impact import audit as _audit  # noqa: F401
 from ringsweep.models.ring.impact import creep as _creep  # noqa: F401
 from ringsweep.models.ring.impact import jam as _jam  # noqa: F401
-from ringsweep.models.ring.impact import part as _part  # noqa: F401
 from ringsweep.models.ring.impact.model import RingImpact, SingleContactImpact
 from ringsweep.models.ring.model import Ring, SingleContactRing
 

@@ -1,4 +1,4 @@
-"""Power series of a body that has left the race: those of a pivot, and of a flight.
+"""Power series of a body that may leave the race: those of a pivot, and of a flight.
 
 The rows of the table are those of :mod:`ringsweep.models.ring.series`. The guard of a contact is its normal reaction
 while it holds, and its gap while it is open. A gap that has just opened begins with coefficients that are zero; its
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from math import atan2, cos, inf, pi, sin, sqrt
 
-from ringsweep.compile import inlined
-from ringsweep.models.interface import series
+from ringsweep.compile import inlined, replacing
+from ringsweep.models.interface import series, simpler
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.ring.impact.mode import (
     BOTH,
@@ -24,6 +24,7 @@ from ringsweep.models.ring.impact.mode import (
     holding,
     place_of,
     ring_of,
+    state_when_closed,
 )
 from ringsweep.models.ring.series import (
     DETERMINANT,
@@ -56,7 +57,6 @@ from ringsweep.numerics.series import (
     crossings,
     differentiate,
     slope,
-    step_size,
     step_within,
     value,
     variation,
@@ -99,14 +99,41 @@ def _expand(scene, mode, t, y, tolerance, c):
     return _expand_pivot(scene, mode, t, y, tolerance, c)
 
 
+# ---- both contacts hold: the closed ring takes the steps --------------------------------------
+
+_with_base = replacing("base")
+
+
+@simpler.kind.implements(ImpactRing)
+def _kind(scene):
+    return simpler.Parted()
+
+
+@simpler.is_simpler.implements(ImpactRing)
+def _is_simpler(scene, mode):
+    return mode.contacts.open == NONE
+
+
+@simpler.part.implements(ImpactRing)
+def _part(scene, record, mode, y):
+    return ring_of(scene, mode.contacts.turned), record.base, (y[0], y[1])
+
+
+@simpler.rejoined.implements(ImpactRing)
+def _rejoined(scene, record, mode, part_record, y, c):
+    state = state_when_closed(y[0], y[1], mode.contacts.turned)
+    c[KIND, 0] = state[-1]
+    return _with_base(record, part_record), state
+
+
+# ---- pivot ------------------------------------------------------------------------------------
+
+
 @inlined
 def _fill_constant(row, number):
     row[0] = number
     for k in range(1, ORDER + 1):
         row[k] = 0.0
-
-
-# ---- pivot ------------------------------------------------------------------------------------
 
 
 @inlined
@@ -276,7 +303,6 @@ def _expand_flight(scene, mode, y, tolerance, c):
         # The angle of the place must not turn by half a turn within a step.
         distance = sqrt(x * x + y_0 * y_0)
         h = 0.1 * h * max(distance / balls.reach, 0.05)
-    last = previous = 0.0
     for contact, gap, guard, zeros, now in (
         (1, GAP_1, NORMAL_1, mode.contacts.zeros_1, y[6]),
         (2, GAP_2, NORMAL_2, mode.contacts.zeros_2, y[7]),
@@ -284,11 +310,9 @@ def _expand_flight(scene, mode, y, tolerance, c):
         if contact == 1 or two:
             _expand_gap(scene, contact, psi, spin, c, gap)
             c[gap, 0] = now
-            found = _leading_zeros(c[gap], zeros, noise)
-            _divide(c, gap, guard, found)
-            last = max(last, abs(c[gap, ORDER]) / (balls.reach * tolerance))
-            previous = max(previous, abs(c[gap, ORDER - 1]) / (balls.reach * tolerance))
-    reach = step_size(last, previous)
+            _divide(c, gap, guard, _leading_zeros(c[gap], zeros, noise))
+    per_gap = 1.0 / (balls.reach * tolerance)
+    reach = step_within(c, ((GAP_1, per_gap), (GAP_2, per_gap if two else 0.0)))
     return min(h, reach), reach
 
 
