@@ -21,7 +21,7 @@ from __future__ import annotations
 from math import atan2, cos, hypot, sin
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook, inlined, replacing
+from ringsweep.compile import feature, inlined, replacing
 from ringsweep.physics import ring
 from ringsweep.quantities.parameters import Leaf
 
@@ -115,19 +115,10 @@ class Contact(NamedTuple):
     lever_t: float
 
 
-@hook
+@feature("1.0", of=ring.TwoContacts)
 def inertia(body):
     """Moment of inertia about the centre of mass, kg m^2. 1 for a particle, on which no force has a moment."""
-
-
-@inertia.implements(ring.TwoContacts)
-def _two_inertia(body):
     return body.inertia
-
-
-@inertia.implements(ring.OneContact)
-def _one_inertia(body):
-    return 1.0
 
 
 @inlined

@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import cos, inf, isnan, sin
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined, replacing, specialise
+from ringsweep.compile import absorbed, feature, hook, inlined, replacing, specialise
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
@@ -138,23 +138,18 @@ def _begin(scene):
     return t, (phi, v), status, mode
 
 
-@hook(optional=True)
-def leaves_behind(drive, scene, t, v):
-    """Whether `v` is the sliding velocity of a body at rest after an infinite acceleration of the ring."""
-    return False
-
-
-@inlined
-def _jerked(drive, scene, t, v):
-    """As :func:`leaves_behind`, under any law, for a drive that may accelerate infinitely at the beginning."""
+@feature("False", of=drives.Power)
+def _is_jerked(drive, scene, t, v):
+    """Whether `v` is the sliding velocity of a body that was at rest before an infinite acceleration of the ring."""
     if v == 0.0 or parts(t)[0] != drives.beginning(drive) or ring.launch_velocity(scene) != 0.0:
         return False
     return v == drives.velocity_at_beginning(drive, 0.0) * scene.body.radius
 
 
-@leaves_behind.implements(drives.Power)
-def _power_leaves_behind(drive, scene, t, v):
-    return stiction_band(scene.law) == 0.0 and _jerked(drive, scene, t, v)
+@inlined
+def leaves_behind(scene, t, v):
+    """Whether the ring has left a body behind at once, which was at rest under a set-valued law."""
+    return stiction_band(scene.law) == 0.0 and _is_jerked(scene.drive, scene, t, v)
 
 
 @series.table_shape.implements(ring.Ring, ring.BristleRing)
@@ -167,7 +162,7 @@ def mode_at(scene, t, phi, v):
     """Status, mode and sliding velocity of a body on closed contacts that has the sliding velocity `v`."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     held = held_at(scene, phi - theta)
-    if stiction_band(scene.law) == 0.0 and (v == 0.0 or leaves_behind(scene.drive, scene, t, v)):
+    if stiction_band(scene.law) == 0.0 and (v == 0.0 or leaves_behind(scene, t, v)):
         # A ring that leaves a body behind may push it off a contact, jam it, or wedge it and take it along.
         status, mode = _mode_at_rest(scene, held, t, phi, 0)
         if v == 0.0 or status != RUNNING:
@@ -195,33 +190,6 @@ def held_at(scene, rho):
 def slipping(scene, mode, rho, slip):
     """Mode of a body that begins to slip; `slip` is the sign, the region of the law, and the entry guard."""
     return with_slip(with_places(mode, *places_beyond(scene, mode.place_1, mode.place_2, rho, slip[0])), *slip)
-
-
-@hook(optional=True)
-def _status_at_start(drive, scene, mode, t, y):
-    """Status of a run that begins in slip."""
-    return after_jump(scene, mode, t, y)
-
-
-# Speeds at which an end is looked for in the band of a smooth law.
-_SPEEDS = 400
-
-
-@_status_at_start.implements(drives.Power)
-def _status_after_jerk(drive, scene, mode, t, y):
-    phi, v = y
-    status = after_jump(scene, mode, t, y)
-    if status == RUNNING or stiction_band(scene.law) == 0.0 or not _jerked(drive, scene, t, v):
-        return status
-    # The sliding velocity has grown from 0 to v in no time, and friction with it: a contact may have been lost before
-    # the body would jam.
-    for i in range(1, _SPEEDS):
-        slower = v * i / _SPEEDS
-        there = with_slip(mode, mode.sign, region_at(scene.law, abs(slower)), -1)
-        earlier = after_jump(scene, there, t, (phi, slower))
-        if earlier != RUNNING:
-            return earlier
-    return status
 
 
 @inlined
@@ -282,6 +250,28 @@ def after_jump(scene, mode, t, y):
     if isnan(K[0] + K[1] + motion[0] + motion[2]):
         return BROKEN
     return ENDS[contact.sliding(scene.body, *K, motion)]
+
+
+# Speeds at which an end is looked for in the band of a smooth law.
+_SPEEDS = 400
+
+
+@feature("after_jump(scene, mode, t, y)", of=drives.Power)
+def _status_at_start(drive, scene, mode, t, y):
+    """Status of a run that begins in slip."""
+    phi, v = y
+    status = after_jump(scene, mode, t, y)
+    if status == RUNNING or stiction_band(scene.law) == 0.0 or not _is_jerked(drive, scene, t, v):
+        return status
+    # The sliding velocity has grown from 0 to v in no time, and friction with it: a contact may have been lost before
+    # the body would jam.
+    for i in range(1, _SPEEDS):
+        slower = v * i / _SPEEDS
+        there = with_slip(mode, mode.sign, region_at(scene.law, abs(slower)), -1)
+        earlier = after_jump(scene, there, t, (phi, slower))
+        if earlier != RUNNING:
+            return earlier
+    return status
 
 
 @inlined

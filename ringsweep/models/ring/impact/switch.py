@@ -197,7 +197,7 @@ def _begin(scene):
     event = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, parts(now)[0], 0)
     mode = with_contacts(mode, Contacts(NONE, 0, 0, 0, event))
     found = status, mode, state_when_closed(phi, v, 0)
-    if leaves_behind(scene.drive, scene.closed, now, v):
+    if leaves_behind(scene.closed, now, v):
         wedged = _after_closed(scene, now, (status, mode, state_when_closed(phi, 0.0, 0)), 2, False)
         # A body that is wedged on one contact is taken along.
         found = _taken_along(scene, now, wedged) if wedged[0] == RUNNING and wedged[1].sign == 0 else found
