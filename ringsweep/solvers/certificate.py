@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.models import tangent
-from ringsweep.models.interface.audit import disobeys, least_scales, undecided
+from ringsweep.models.interface.audit import disobeys, least_scales, same_statistics, undecided
 from ringsweep.quantities.flags import (
     ANSWERS_DIFFER,
     CERTIFIED,
     CLOSE_CALL,
+    DIVERGES,
     FAILED,
     LAW_NOT_OBEYED,
     NO_RESULT,
@@ -76,9 +77,9 @@ class TwoRuns(NamedTuple):
     second_rows: NDArray[np.float64]
     outcomes: tuple[str, ...]
 
-    def column(self, name: str) -> NDArray[np.float64]:
-        """An outcome of the runs."""
-        return self.rows[:, self.outcomes.index(name)]
+    def named(self, rows: NDArray[np.float64]) -> SimpleNamespace:
+        """Outcomes of some runs by name."""
+        return SimpleNamespace(**dict(zip(self.outcomes, rows.T, strict=True)))
 
 
 def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
@@ -100,49 +101,45 @@ def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes:
     return same & (rows[:, outcomes.index("regime")] != FAILED)
 
 
-def doubts(runs: TwoRuns, fall_rates: Any) -> NDArray[np.int8]:
-    """What speaks against the certificate of each cell: a failure, disagreement, an error that may change the regime.
+def judged(
+    runs: TwoRuns, fall_rates: Any, diverge: NDArray[np.bool_], doubt: tuple[NDArray[np.bool_], int], **bounds: Any
+) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
+    """What speaks against the certificate of each cell, and bounds on its errors.
 
     Parameters
     ----------
     runs : TwoRuns
     fall_rates : ndarray of shape ``(cells,)``
         As for :func:`ringsweep.models.interface.audit.undecided`.
+    diverge : ndarray of bool, shape ``(cells,)``
+        Whether nearby runs diverge.
+    doubt : tuple
+        Where the method itself has a doubt, of shape ``(cells,)``, and which.
+    **bounds
+        Arguments of :func:`errors`.
 
     Returns
     -------
-    ndarray of int8, shape ``(cells,)``
-        Values of :data:`ringsweep.quantities.variables.DOUBTS`; ``CERTIFIED`` where nothing speaks against it.
+    tuple of ndarray
+        Values of :data:`ringsweep.quantities.variables.DOUBTS`, ``CERTIFIED`` where nothing speaks against the
+        certificate; and what :func:`errors` returns, NaN where runs diverge.
     """
     batch, rows, second_rows, outcomes = runs
+    one, other = runs.named(rows), runs.named(second_rows)
     needed = [column for column, name in enumerate(outcomes) if name not in _MAY_LACK]
-    reasons = [
-        (runs.column("regime") == FAILED, NO_RESULT),
-        (~agree(rows, second_rows, outcomes), ANSWERS_DIFFER),
-        (disobeys(batch, rows) | disobeys(batch, second_rows), LAW_NOT_OBEYED),
-        (undecided(batch, rows, second_rows, fall_rates), CLOSE_CALL),
-        (~np.isfinite(rows[:, needed]).all(axis=1), NOT_FINITE),
-    ]
-    return first_of(reasons, len(rows))
-
-
-def first_of(reasons: Sequence[tuple[NDArray[np.bool_], Any]], cells: int) -> NDArray[np.int8]:
-    """The first reason that holds for each cell; ``CERTIFIED`` where none does.
-
-    Parameters
-    ----------
-    reasons : sequence of tuple
-        For each reason the cells for which it holds, of shape ``(cells,)``, and its number, or its number in each cell.
-    cells : int
-
-    Returns
-    -------
-    ndarray of int8, shape ``(cells,)``
-    """
-    found = np.full(cells, CERTIFIED, dtype=np.int8)
-    for holds, reason in reasons:
-        found = np.where(holds & (found == CERTIFIED), reason, found).astype(np.int8)
-    return found
+    chaotic = diverge & ~same_statistics(batch, one, other) if diverge.any() else diverge
+    reasons = {
+        NO_RESULT: one.regime == FAILED,
+        ANSWERS_DIFFER: ~agree(rows, second_rows, outcomes),
+        LAW_NOT_OBEYED: disobeys(batch, one) | disobeys(batch, other),
+        CLOSE_CALL: undecided(batch, one, other, fall_rates),
+        NOT_FINITE: ~np.isfinite(rows[:, needed]).all(axis=1),
+    }
+    cases = [*reasons.items(), doubt[::-1], (DIVERGES, chaotic)]
+    because = np.select([holds for _, holds in cases], [reason for reason, _ in cases], CERTIFIED).astype(np.int8)
+    found = errors(runs, **bounds)
+    found[diverge] = np.nan
+    return because, found
 
 
 def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
@@ -153,7 +150,8 @@ def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
     """
     ends = [column for column, name in enumerate(with_errors(runs.outcomes)) if name.endswith("_end")]
     # The time for which it sticks is a sum, which is rounded.
-    stuck = np.isclose(runs.column("stick_time"), runs.column("t_end"), rtol=1e-12, atol=0.0)
+    one = runs.named(runs.rows)
+    stuck = np.isclose(one.stick_time, one.t_end, rtol=1e-12, atol=0.0)
     difference, scale = _differences(runs)
     with np.errstate(invalid="ignore"):
         same = (difference <= _SAME * scale)[:, ends].all(axis=1)
@@ -247,7 +245,8 @@ def errors(
             if names[k] in _FORCES:
                 bound[:, k] += force_floor * scale[:, k]
     # A run that reaches the end of the span has an exact time of its end.
-    reached = runs.column("regime") == runs.column("motion")
+    one = runs.named(runs.rows)
+    reached = one.regime == one.motion
     bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
     bound[~agree(*runs[1:])] = np.nan
     return bound

@@ -18,19 +18,10 @@ from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
 from ringsweep.physics.friction.velocity import varies
-from ringsweep.quantities.flags import CERTIFIED, DIVERGES, FAILED, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
+from ringsweep.quantities.flags import CERTIFIED, FAILED, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.solvers.automaton import PATIENCE, History, LocalErrors, Results, integrate
-from ringsweep.solvers.certificate import (
-    TwoRuns,
-    apart,
-    diverging,
-    doubts,
-    errors,
-    first_of,
-    took_same_steps,
-    with_errors,
-)
+from ringsweep.solvers.certificate import TwoRuns, apart, diverging, judged, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 from ringsweep.solvers.steps import FACTOR
 
@@ -173,16 +164,11 @@ class _Piecewise(Method):
             Reasons against each certificate; bounds, NaN where nearby runs diverge; distance of the runs where they
             diverge, infinite elsewhere; whether they diverge, but a tighter tolerance may show that they converge.
         """
-        batch, rows, second_rows, _ = runs
+        batch = runs.batch
         of_bristles = family_of(type(batch.law)) is Dynamic
         distance = apart(runs)
         diverge = diverging(distance, looser[of_bristles], distance_before)
         obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
-        because = doubts(runs, audits[:, 2])
-        chaotic = diverge & ~audit.same_statistics(batch, rows, second_rows) if diverge.any() else diverge
-        because = first_of(
-            [(because != CERTIFIED, because), (~obeys_law, LAW_NOT_OBEYED), (chaotic, DIVERGES)], len(rows)
-        )
         tolerance, implicit_tolerance = self.tolerances()
         local = LocalErrors(*audits[:, 3:].T)
         if of_bristles:
@@ -195,11 +181,14 @@ class _Piecewise(Method):
             force_floor = _SHARE_OF_REACTIONS * REACTION_TOLERANCE * remainder
             floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
-        magnified, left_out = audit.magnified(batch, rows)
+        magnified, left_out = audit.magnified(batch, runs.named(runs.rows))
         is_constant = family_of(type(batch.law)) is SetValued and not varies(take(batch, 0).law, 0)
         safety, share = _SAFETY_AND_SHARE["constant" if is_constant else "bristles" if of_bristles else "varying"]
-        bounds = errors(
+        because, bounds = judged(
             runs,
+            audits[:, 2],
+            diverge,
+            (~obeys_law, LAW_NOT_OBEYED),
             safety=np.where(magnified, _MAGNIFIED, 1.0) * safety,
             share=share,
             steps=steps,
@@ -207,7 +196,6 @@ class _Piecewise(Method):
             rate_floor=tolerance * local.rate,
             force_floor=force_floor,
         )
-        bounds[diverge] = np.nan
         may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])
         return because, bounds, np.where(diverge, distance, np.inf), may_converge
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import Cells, absorbed, add_scaled, feature, inlined, kernel, put, take
 from ringsweep.errors import InputError
-from ringsweep.models.interface import audit, constant_step, recorder
+from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
 from ringsweep.models.scene import Structure
 from ringsweep.numerics.functions import any_of, select
@@ -25,9 +25,9 @@ from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, si
 from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, without_shape
 from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
-from ringsweep.quantities.flags import CERTIFIED, COARSE, DIVERGES, FAILED, NO_RESULT, NOT_ASKED, SEPARATING
+from ringsweep.quantities.flags import CERTIFIED, COARSE, FAILED, NO_RESULT, NOT_ASKED, SEPARATING
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.solvers.certificate import TwoRuns, apart, doubts, errors, first_of, with_errors
+from ringsweep.solvers.certificate import TwoRuns, apart, judged, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 #: Radius of the largest half disc in the left half plane in which the method is stable (more exactly 2.616). On the
@@ -124,17 +124,15 @@ class RK4(Method):
                 trusted = (
                     contacts_held & (half_report[:, 1] <= STABILITY_LIMIT) & (half_report[:, 4] <= _MOST_ARC_SHARE)
                 )
-                diverge = apart(runs) > _MOST_APART
-                chaotic = diverge
-                if diverge.any():
-                    chaotic = diverge & ~audit.same_statistics(stable_batch, stable_rows, half_rows)
-                doubt = doubts(runs, half_report[:, 3])
-                because[stable] = first_of(
-                    [(doubt != CERTIFIED, doubt), (~trusted, COARSE), (chaotic, DIVERGES)], len(stable)
+                because[stable], bounds[stable] = judged(
+                    runs,
+                    half_report[:, 3],
+                    apart(runs) > _MOST_APART,
+                    (~trusted, COARSE),
+                    safety=_SAFETY,
+                    share=_SHARE_OF_LARGEST,
+                    steps=report[stable, 0],
                 )
-                found = errors(runs, safety=_SAFETY, share=_SHARE_OF_LARGEST, steps=report[stable, 0])
-                found[diverge] = np.nan
-                bounds[stable] = found
         return Result(
             rows,
             steps=report[:, 0],

@@ -6,7 +6,6 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.models.belt.force import breakaway_force, length_scale, moving, sliding, speed_scale
-from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface import audit, implicit
 from ringsweep.models.sliding import audited, larger, of_balances, speed_in
 from ringsweep.models.slip import acceleration_slopes, slip
@@ -77,14 +76,8 @@ def _audited(scene, mode, forcing, y):
     return now, _terms(scene.body, now.motion, forcing), 0.0
 
 
-def _outcome(rows):
-    """The outcomes that every run has, in columns."""
-    return Outcome(*rows.T[: len(Outcome._fields)])
-
-
 @audit.undecided.implements(Belt, BristleBelt)
-def _undecided(batch, rows, second_rows, fall_rates):
-    one, other = _outcome(rows), _outcome(second_rows)
+def _undecided(batch, one, other, fall_rates):
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         return _sliding_or_swing(batch, one, other) | _may_hold(batch.body, one, other, fall_rates)
 
@@ -118,8 +111,7 @@ def _may_hold(body, one, other, fall_rates):
 
 
 @audit.same_statistics.implements(Belt, BristleBelt)
-def _same_statistics(batch, rows, second_rows):
-    one, other = _outcome(rows), _outcome(second_rows)
+def _same_statistics(batch, one, other):
     with np.errstate(invalid="ignore", over="ignore"):
         range_1, range_2 = one.x_max - one.x_min, other.x_max - other.x_min
         same = np.abs(range_1 - range_2) <= _SAME_SHARE * np.minimum(range_1, range_2)

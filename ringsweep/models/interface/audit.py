@@ -62,7 +62,7 @@ def is_reaction(scene, guard):
 
 
 @hook(optional=True)
-def undecided(batch, rows, second_rows, fall_rates):
+def undecided(batch, one, other, fall_rates):
     """Which runs of a batch are so close to another regime that their error could change the regime.
 
     It runs outside kernels and may use NumPy.
@@ -71,8 +71,9 @@ def undecided(batch, rows, second_rows, fall_rates):
     ----------
     batch : NamedTuple
         Cells. The type of the batch decides which body runs.
-    rows, second_rows : ndarray of shape ``(cells, outcomes)``
-        Outcomes of the runs, and of second runs at another resolution. Their difference estimates the error.
+    one, other : SimpleNamespace
+        Outcomes of the runs, and of second runs at another resolution: arrays of shape ``(cells,)``, by name. Their
+        difference estimates the error.
     fall_rates : ndarray of shape ``(cells,)``
         Rate at which the reaction that ended each run fell, N/s; infinite if something else ended it.
 
@@ -81,11 +82,11 @@ def undecided(batch, rows, second_rows, fall_rates):
     ndarray of bool, shape ``(cells,)``
         By default false for all cells.
     """
-    return np.zeros(len(rows), dtype=bool)
+    return np.zeros(len(batch.span), dtype=bool)
 
 
 @hook(optional=True)
-def disobeys(batch, rows):
+def disobeys(batch, one):
     """Which runs of a batch have an outcome that no motion obeying the law has, beside what the audit finds.
 
     It runs outside kernels and may use NumPy.
@@ -94,19 +95,19 @@ def disobeys(batch, rows):
     ----------
     batch : NamedTuple
         Cells. The type of the batch decides which body runs.
-    rows : ndarray of shape ``(cells, outcomes)``
-        Outcomes of the runs.
+    one : SimpleNamespace
+        Outcomes of the runs: arrays of shape ``(cells,)``, by name.
 
     Returns
     -------
     ndarray of bool, shape ``(cells,)``
         By default false for all cells.
     """
-    return np.zeros(len(rows), dtype=bool)
+    return np.zeros(len(batch.span), dtype=bool)
 
 
 @hook(optional=True)
-def same_statistics(batch, rows, second_rows):
+def same_statistics(batch, one, other):
     """Which runs of a batch have the same statistics as other runs of the same cells, within sampling error.
 
     Nearby runs of a chaotic motion diverge. Their numbers at the end say nothing, but their regime may be certain. It
@@ -116,15 +117,15 @@ def same_statistics(batch, rows, second_rows):
     ----------
     batch : NamedTuple
         Cells. The type of the batch decides which body runs.
-    rows, second_rows : ndarray of shape ``(cells, outcomes)``
-        Outcomes of the runs, and of second runs at another resolution.
+    one, other : SimpleNamespace
+        Outcomes of the runs, and of second runs at another resolution: arrays of shape ``(cells,)``, by name.
 
     Returns
     -------
     ndarray of bool, shape ``(cells,)``
         By default false for all cells: the runs have no statistics.
     """
-    return np.zeros(len(rows), dtype=bool)
+    return np.zeros(len(batch.span), dtype=bool)
 
 
 @hook(optional=True)
@@ -167,7 +168,7 @@ def least_scales(batch):
 
 
 @hook(optional=True)
-def magnified(batch, rows):
+def magnified(batch, one):
     """Which runs had events that magnify the errors of what was before, as impacts do, and what their model leaves out.
 
     It runs outside kernels.
@@ -176,8 +177,8 @@ def magnified(batch, rows):
     ----------
     batch : NamedTuple
         Cells. The type of the batch decides which body runs.
-    rows : ndarray of shape ``(cells, outcomes)``
-        Outcomes of the runs.
+    one : SimpleNamespace
+        Outcomes of the runs: arrays of shape ``(cells,)``, by name.
 
     Returns
     -------
@@ -185,7 +186,7 @@ def magnified(batch, rows):
         Booleans, and relative errors that no tolerance of the steps shows; both of shape ``(cells,)``. By default false
         and 0 for all cells.
     """
-    return np.zeros(len(rows), dtype=bool), np.zeros(len(rows))
+    return np.zeros(len(batch.span), dtype=bool), np.zeros(len(batch.span))
 
 
 #: Functions without a default.

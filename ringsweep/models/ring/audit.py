@@ -15,7 +15,6 @@ from ringsweep.compile import inlined, take
 from ringsweep.models.interface import audit
 from ringsweep.models.ring.bristles import slip_of
 from ringsweep.models.ring.contacts import coefficients_under
-from ringsweep.models.ring.record import Outcome
 from ringsweep.models.ring.series import NORMAL_1, NORMAL_2
 from ringsweep.models.sliding import REACTION_TOLERANCE, audited, larger, of_balances, rate_at_rest, speed_in
 from ringsweep.physics import contact, drives, ring
@@ -126,18 +125,11 @@ def _is_reaction(scene, guard):
 
 
 @audit.undecided.implements(ring.Ring, ring.BristleRing)
-def undecided_on_contacts(batch, rows, second_rows, fall_rates):
+def undecided_on_contacts(batch, one, other, fall_rates):
     """Which runs are so close to another regime that their error could change it, see :func:`audit.undecided`."""
     # Comparisons with NaN are false.
     with np.errstate(invalid="ignore", over="ignore"):
-        return _is_near_another_regime(batch, _outcome(rows), _outcome(second_rows), fall_rates) | _is_launched_on_edge(
-            batch
-        )
-
-
-def _outcome(rows):
-    """Outcomes by name, without what is asked for beside them."""
-    return Outcome(*rows.T[: len(Outcome._fields)])
+        return _is_near_another_regime(batch, one, other, fall_rates) | _is_launched_on_edge(batch)
 
 
 def _is_launched_on_edge(batch):

@@ -8,6 +8,7 @@ balls.
 from __future__ import annotations
 
 from math import inf
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -23,9 +24,7 @@ from ringsweep.models.ring.impact.mode import (
     place_of,
     ring_of,
 )
-from ringsweep.models.ring.impact.record import OUTCOMES
 from ringsweep.models.ring.impact.switch import SUMMED, motion_of
-from ringsweep.models.ring.record import Outcome
 from ringsweep.models.sliding import REACTION_TOLERANCE, larger, rate_at_rest, speed_in
 from ringsweep.physics import pivot, ring
 from ringsweep.physics.friction.velocity import friction_at
@@ -111,15 +110,20 @@ def _is_reaction(scene, guard):
 
 
 @audit.undecided.implements(ImpactRing)
-def _undecided(batch, rows, second_rows, fall_rates):
-    own = len(Outcome._fields)
-    return undecided_on_contacts(batch.closed, _lost(rows[:, :own]), _lost(second_rows[:, :own]), fall_rates)
+def _undecided(batch, one, other, fall_rates):
+    return undecided_on_contacts(batch.closed, _all_lost(one), _all_lost(other), fall_rates)
+
+
+def _all_lost(one):
+    """Outcomes in which the separating contacts are all that have been open: their least reaction is zero."""
+    lost = 1.0 * (one.normal_min_1 == 0.0) + 2.0 * (one.normal_min_2 == 0.0)
+    contacts = np.where(one.regime == SEPARATING, lost, one.separating_contact)
+    return SimpleNamespace(**vars(one) | {"separating_contact": contacts})
 
 
 @audit.disobeys.implements(ImpactRing)
-def _disobeys(batch, rows):
-    violation = rows[:, len(Outcome._fields) + OUTCOMES.index("impact_violation")]
-    return ~(violation <= _MOST_VIOLATION)
+def _disobeys(batch, one):
+    return ~(one.impact_violation <= _MOST_VIOLATION)
 
 
 # Share by which the restitution of a second run differs: some rounding errors.
@@ -139,15 +143,6 @@ def _least_scales(batch):
 
 
 @audit.magnified.implements(ImpactRing)
-def _magnified(batch, rows):
-    impacts, separations = (rows[:, len(Outcome._fields) + OUTCOMES.index(n)] for n in ("impacts", "separations"))
+def _magnified(batch, one):
     # Each loss of a contact ends with rebounds that are summed.
-    return impacts > 0.0, SUMMED * separations
-
-
-def _lost(rows):
-    """Outcomes in which the separating contacts are all that have been open: their least reaction is zero."""
-    outcome = Outcome(*rows.T)
-    lost = 1.0 * (outcome.normal_min_1 == 0.0) + 2.0 * (outcome.normal_min_2 == 0.0)
-    contacts = np.where(outcome.regime == SEPARATING, lost, outcome.separating_contact)
-    return np.column_stack(outcome._replace(separating_contact=contacts))
+    return one.impacts > 0.0, SUMMED * one.separations
