@@ -223,7 +223,7 @@ def family(cells, model="ring", law="bengisu-akay", count=40):
 @kernel
 def _serial(batch, launches, table, stretch, results):
     """Outcomes of all cells by floats, one by one; `table` holds the drive for the whole span."""
-    _, steps, h = stretch
+    _, steps, h, _ = stretch
     for cell in range(len(results.rows)):
         scene = take(batch, cell)
         y, now, record, diagnosis, live = rk4._initial_run(batch, launches, cell, table)
@@ -256,7 +256,7 @@ def integrate(batch, steps, names, *, order=None, serial=False):
     results = rk4.Results(np.empty((cells, len(names))), np.empty((cells, 5)))
     scenes, launches = rk4.prepare(batch)
     if serial:
-        table, stretch = np.empty((2 * steps + 1, 2)), rk4._Stretch(0, steps, float(batch.span[0]) / steps)
+        table, stretch = np.empty((2 * steps + 1, 2)), rk4._Stretch(0, steps, float(batch.span[0]) / steps, True)
         rk4._tabulate(table, drive, stretch)
         _serial(scenes, launches, table, stretch, results)
     else:

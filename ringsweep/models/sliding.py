@@ -53,14 +53,14 @@ def _in_space(scene, t, y):
 
 
 # The place of an implicit step is relative to the drive, so that no large numbers cancel in slow creep.
-@implicit.to_implicit.implements(Ring, Belt)
+@implicit.to_implicit.implements(Ring, Belt, BristleBelt)
 def _to_implicit(scene, forcing, y):
-    return y[0] - forcing[0], y[1]
+    return y[0] - forcing[0], *y[1:]
 
 
-@implicit.from_implicit.implements(Ring, Belt)
+@implicit.from_implicit.implements(Ring, Belt, BristleBelt)
 def _from_implicit(scene, forcing, x):
-    return x[0] + forcing[0], x[1]
+    return x[0] + forcing[0], *x[1:]
 
 
 # ---- series ----------------------------------------------------------------------------------

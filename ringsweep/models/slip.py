@@ -14,6 +14,7 @@ from ringsweep.numerics.terms import joined
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_rate
+from ringsweep.physics.friction.presliding import bristle
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import region_bounds, stiction_band
 from ringsweep.physics.ring import BristleRing, Ring
@@ -60,9 +61,27 @@ class Slip(NamedTuple):
     bristles: Any
 
 
+@absorbed
+def bundled(law, coefficients, v, z, sign, region):
+    """K of a bundle of bristles, its derivative by the sliding velocity, s/m, and the :class:`Bundle`.
+
+    `coefficients` are the static and the kinetic one; see :func:`ringsweep.physics.friction.presliding.bristle`.
+    """
+    rate, rate_v, rate_z, traction, by_v, by_z = bristle(law, *coefficients, v, z, sign, region)
+    return -traction, -by_v, Bundle(rate, rate_v, rate_z, -by_z)
+
+
 @hook(absorb=True)
 def slip(scene, mode, common, forcing, x):
     """The :class:`Slip` of the state of an implicit step; see :func:`implicit.rates` for the arguments."""
+
+
+@inlined
+def slip_at(scene, mode, t, y):
+    """The :class:`Slip` of the state of a mode at a time."""
+    forcing = drives.turn(scene.drive, t)
+    x = implicit.to_implicit(scene, forcing, y)
+    return slip(scene, mode, implicit.common(scene, mode, forcing, x), forcing, x)
 
 
 @hook(absorb=True)
@@ -164,10 +183,15 @@ def _jacobian(scene, mode, t, y):
     per_radius = 0.0 if in_dead_band else 1.0 / ring.radius(scene.body)
     if mode.sign == 0:
         return 0.0, per_radius, 0.0, 0.0
-    forcing = drives.turn(scene.drive, t)
     # At the end of slip the velocity is zero but for rounding, which must not turn friction round.
     v = mode.sign * max(mode.sign * y[1], 1e-300)
-    x = implicit.to_implicit(scene, forcing, (y[0], v))
-    now = slip(scene, mode, implicit.common(scene, mode, forcing, x), forcing, x)
-    by_place, by_v, _ = acceleration_slopes(scene, now)
+    by_place, by_v, _ = acceleration_slopes(scene, slip_at(scene, mode, t, (y[0], v)))
     return 0.0, per_radius, by_place, 0.0 if in_dead_band else by_v
+
+
+@variation.jacobian.implements(BristleBelt)
+def _jacobian_with_bristles(scene, mode, t, y):
+    now = slip_at(scene, mode, t, y)
+    by_place, by_v, _ = acceleration_slopes(scene, now)
+    (by_z,), (bundle,) = by_deflections(now.bristles, scene, now), now.bristles
+    return 0.0, 1.0, 0.0, by_place, by_v, by_z, 0.0, bundle.rate_v, bundle.rate_z

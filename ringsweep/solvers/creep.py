@@ -10,7 +10,7 @@ import numpy as np
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit, modes, recorder, variation
 from ringsweep.numerics.clock import Instant, later
-from ringsweep.numerics.series import ORDER, ascending, crossings, differentiate, first_root, value
+from ringsweep.numerics.series import ORDER, ascending, crossings, differentiate
 from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.steps import INSTANTS
@@ -227,29 +227,21 @@ def _interpolate(samples, row):
 
 @inlined
 def _fraction_below_zero(samples, work):
-    """Fraction of a step, soon after the first root of a guard, at which the guard is below zero; 0 if there is none.
+    """Fraction of a step at which a guard is below zero after its first root; 0 if there is none.
 
     `samples` are the values of the guard. A guard may stay at zero: a body at rest in equilibrium does not move.
     """
-    first = 1
-    while first <= INSTANTS and samples[first] >= 0.0:
-        first += 1
-    end = first / INSTANTS if first <= INSTANTS else 0.0
     if samples[0] <= 0.0:
-        return end
-    row = work[0]
+        for i in range(1, INSTANTS + 1):
+            if samples[i] < 0.0:
+                return i / INSTANTS
+        return 0.0
+    row, roots = work[-1], work[0]
     _interpolate(samples, row)
-    root, found = first_root(row, 1.0, work[1:])
-    if not found or (end > 0.0 and root > end - 1.0 / INSTANTS):
-        return end
-    # The guard dips below zero between two instants: take the bottom of the dip.
-    lowest, bottom = 0.0, 0.0
-    for i in range(1, 33):
-        fraction = root + (1.0 / INSTANTS) * i / 32.0
-        value_there = value(row, min(fraction, 1.0))
-        if value_there < lowest:
-            lowest, bottom = value_there, min(fraction, 1.0)
-    return bottom if bottom > 0.0 else root
+    count = crossings(row, 1.0, work[:-1], 0)
+    ascending(roots, count)
+    # Between two roots the guard dips below zero.
+    return 0.0 if count == 0 else 1.0 if count == 1 else 0.5 * (roots[0] + roots[1])
 
 
 # Largest factor by which the length of a step grows.

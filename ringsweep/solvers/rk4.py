@@ -146,7 +146,7 @@ class RK4(Method):
         self, batch: Any, cells: NDArray[np.intp], steps: int, width: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         results = Results(np.empty((len(batch.span), width)), np.empty((len(batch.span), 5)))
-        diagnosed = Diagnosed() if self.diagnose else NotDiagnosed()
+        diagnosed = Diagnosed() if self.diagnose else ()
         scenes, launches = prepare(batch)
         for group in _groups_by_drive(batch, cells):
             integrate(diagnosed, scenes, launches, take(batch.drive, group[0]), group, steps, results)
@@ -174,11 +174,7 @@ LIVE, FINISHED, ENDING, CHECKED = 1.0, 0.0, 2.0, -1.0
 
 
 class Diagnosed(NamedTuple):
-    """Stiffness, least margin and largest share of a zone are recorded for each run."""
-
-
-class NotDiagnosed(NamedTuple):
-    """Stiffness, least margin and largest share of a zone are not recorded."""
+    """Stiffness, least margin and largest share of a zone are recorded for each run. Otherwise: an empty tuple."""
 
 
 class Diagnosis(NamedTuple):
@@ -189,7 +185,7 @@ class Diagnosis(NamedTuple):
     arc_share: Any
 
 
-@feature("diagnosis", of=Diagnosed, absorb=True)
+@feature("diagnosis", absorb=True)
 def _diagnose(diagnosed, scene, diagnosis, before, now, h):
     """Diagnosis of a run after one more step."""
     return Diagnosis(
@@ -234,11 +230,15 @@ class _Buffers(NamedTuple):
 
 
 class _Stretch(NamedTuple):
-    """Steps for which the table of the drive is filled: index of the first one, their number, and their length, s."""
+    """Steps for which the table of the drive is filled.
+
+    Index of the first one, their number, their length, s, and whether the span ends with them.
+    """
 
     first: int
     steps: int
     h: float
+    is_last: bool
 
 
 class _Block(NamedTuple):
@@ -308,13 +308,27 @@ def _hermite(y, rate, y_next, rate_next, h, x):
 
 
 @inlined
+def _step_to_end(scene, y, now, table, k, h):
+    """Status after a step, or after the fraction of it in which the run ends; this fraction; state and inspection.
+
+    The inspection is that at the end of the whole step.
+    """
+    y_next = _step(scene, y, now, table, k, h)
+    after = constant_step.inspect(scene, y_next, lookup(scene.drive, table, k + 2))
+    status, fraction = constant_step.verdict(scene, now, after)
+    if status != RUNNING:
+        y_next = _hermite(y, now.rates, y_next, after.rates, h, fraction)
+    return status, fraction, y_next, after
+
+
+@inlined
 def _advance(diagnosed, batch, block, table, stretch, k):
     """Advance runs side by side from step `k` to the end of a stretch, or to a step in which a run ends.
 
     Returns the index of the first step that was not taken.
     """
     align_stack()
-    one, (first, steps, h) = take(batch, block.cells[0]), stretch
+    one, (first, steps, h, _) = take(batch, block.cells[0]), stretch
     runs_at = block.at + WIDTH * size_of(one)
     scene = read_lanes(block.memory, block.at, one)
     y, now, record, diagnosis, live = read_lanes(block.memory, runs_at, block.sample)
@@ -339,7 +353,7 @@ def _advance(diagnosed, batch, block, table, stretch, k):
 @inlined
 def _finish_ended(diagnosed, batch, block, table, stretch, k, results):
     """Finish the runs that end in step `k`, one by one with floats; return the number of runs that go on."""
-    first, _, h = stretch
+    first, _, h, _ = stretch
     running = 0
     for lane in range(len(block.cells)):
         scene = take(batch, block.cells[lane])
@@ -347,15 +361,12 @@ def _finish_ended(diagnosed, batch, block, table, stretch, k, results):
         run = read(block.memory, start, WIDTH, block.sample)
         live = run.live
         if live == ENDING:
-            y_next = _step(scene, run.y, run.now, table, 2 * k, h)
-            after = constant_step.inspect(scene, y_next, lookup(scene.drive, table, 2 * k + 2))
-            status, fraction = constant_step.verdict(scene, run.now, after)
+            status, fraction, y_end, after = _step_to_end(scene, run.y, run.now, table, 2 * k, h)
             # Vector lanes and floats differ in the last bit, so that with floats the run may not end in this step.
             live = CHECKED
             if status != RUNNING:
                 live = FINISHED
                 diagnosis = _diagnose(diagnosed, scene, run.diagnosis, run.now, after, h)
-                y_end = _hermite(run.y, run.now.rates, y_next, after.rates, h, fraction)
                 t = (first + k + fraction) * h
                 stuck, seen = constant_step.sticks(scene, run.now, after), constant_step.seen(scene, y_end, after)
                 record = recorder.observe(scene, run.record, t, fraction * h, stuck, seen)
@@ -410,8 +421,8 @@ def integrate(
 
     Parameters
     ----------
-    diagnosed : Diagnosed or NotDiagnosed
-        Whether the diagnosis of each run is recorded.
+    diagnosed : Diagnosed or tuple
+        Whether the diagnosis of each run is recorded; an empty tuple if not.
     batch, launches : nested tuple of ndarray
         Cells and their initial states, from :func:`prepare`.
     drive : NamedTuple
@@ -425,16 +436,15 @@ def integrate(
     """
     h = float(batch.batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, len(table_row(drive, 0.0))))
-    _tabulate(table, drive, _Stretch(0, 0, h))
+    _tabulate(table, drive, _Stretch(0, 0, h, False))
     memory, occupants, live = _start(batch, launches, cells, table, results)
     buffers = _Buffers(table, memory, occupants)
     for first in range(0, steps, _BLOCK):
         if live == 0:
             return
-        stretch = _Stretch(first, min(_BLOCK, steps - first), h)
+        stretch = _Stretch(first, min(_BLOCK, steps - first), h, first + _BLOCK >= steps)
         _tabulate(table, drive, stretch)
         live = _advance_block(diagnosed, batch, launches, buffers, live, stretch, results)
-    _finish_at_end_of_span(batch, launches, buffers, live, _Stretch(0, steps, h), results)
 
 
 @kernel
@@ -470,7 +480,10 @@ def _start(batch, launches, cells, table, results):
 
 @kernel
 def _advance_block(diagnosed, batch, launches, buffers, live, stretch, results):
-    """Advance all runs by a stretch of steps and close the gaps of finished runs; return the number of other runs."""
+    """Advance all runs by a stretch of steps and close the gaps of finished runs; return the number of other runs.
+
+    The last stretch finishes all.
+    """
     table, memory, occupants = buffers
     numbers = memory.shape[1]
     flat_memory = memory.reshape(memory.size)
@@ -485,7 +498,15 @@ def _advance_block(diagnosed, batch, launches, buffers, live, stretch, results):
             running = _finish_ended(diagnosed, batch, block, table, stretch, k, results)
     remaining = 0
     for slot in range(live):
-        if memory[slot // WIDTH, numbers - 1, slot % WIDTH] != FINISHED:
+        if memory[slot // WIDTH, numbers - 1, slot % WIDTH] == FINISHED:
+            continue
+        if stretch.is_last:
+            scene = take(batch, occupants[slot])
+            at = (slot // WIDTH * numbers + size_of(scene)) * WIDTH + slot % WIDTH
+            # The sum of the steps would miss the end of the span by rounding.
+            end = _End(COMPLETE, scene.span, float(stretch.first + stretch.steps), 0.0)
+            _conclude(scene, read(flat_memory, at, WIDTH, sample), end, stretch.h, occupants[slot], results)
+        else:
             # A slice would add the code for errors about shapes, which takes a second to compile.
             for number in range(numbers):
                 memory[remaining // WIDTH, number, remaining % WIDTH] = memory[slot // WIDTH, number, slot % WIDTH]
@@ -495,22 +516,6 @@ def _advance_block(diagnosed, batch, launches, buffers, live, stretch, results):
     for slot in range(remaining, live):
         memory[slot // WIDTH, numbers - 1, slot % WIDTH] = FINISHED
     return remaining
-
-
-@kernel
-def _finish_at_end_of_span(batch, launches, buffers, live, stretch, results):
-    """Store the outcomes of the runs that reached the end of the span; `stretch` are all steps."""
-    _, memory, occupants = buffers
-    numbers = memory.shape[1]
-    flat_memory = memory.reshape(memory.size)
-    sample = _initial_run(batch, launches, occupants[0], np.zeros((1, _MOST_COLUMNS)))
-    for slot in range(live):
-        cell = occupants[slot]
-        scene = take(batch, cell)
-        at = (slot // WIDTH * numbers + size_of(scene)) * WIDTH + slot % WIDTH
-        # The sum of the steps would miss the end of the span by rounding.
-        end = _End(COMPLETE, scene.span, float(stretch.steps), 0.0)
-        _conclude(scene, read(flat_memory, at, WIDTH, sample), end, stretch.h, cell, results)
 
 
 @inlined
@@ -530,31 +535,23 @@ def _history(batch, steps, interval, times, rows):
     table = np.empty((3, _MOST_COLUMNS))
     y = constant_step.initial_state(scene)
     _fill(table, scene.drive, 0, 1, h)
-    forcing = lookup(scene.drive, table, 0)
-    now = constant_step.inspect(scene, y, forcing)
+    now = constant_step.inspect(scene, y, lookup(scene.drive, table, 0))
     status, _ = constant_step.verdict(scene, now, now)
-    count = 0
-    for k in range(steps + 1):
-        if k % interval == 0 or k == steps or status != RUNNING:
-            times[count] = k * h if k < steps else scene.span
-            row = constant_step.row(scene, y, forcing)
+    k, count, t = 0, 0, 0.0
+    while True:
+        # The history ends with the run, within a step.
+        ends = k == steps or status != RUNNING
+        if ends or k % interval == 0:
+            times[count] = t
+            row = constant_step.row(scene, y, turn(scene.drive, t))
             for column in range(len(row)):
                 rows[count, column] = row[column]
             count += 1
-        if k == steps or status != RUNNING:
-            break
+        if ends:
+            return count
         _fill(table, scene.drive, k, 1, h)
-        y_next = _step(scene, y, now, table, 0, h)
-        forcing = lookup(scene.drive, table, 2)
-        after = constant_step.inspect(scene, y_next, forcing)
-        status, fraction = constant_step.verdict(scene, now, after)
-        if status != RUNNING:
-            # The history ends with the run, within the step.
-            times[count] = (k + fraction) * h
-            y_end = _hermite(y, now.rates, y_next, after.rates, h, fraction)
-            row = constant_step.row(scene, y_end, turn(scene.drive, times[count]))
-            for column in range(len(row)):
-                rows[count, column] = row[column]
-            return count + 1
-        y, now = y_next, after
-    return count
+        status, fraction, y, now = _step_to_end(scene, y, now, table, 0, h)
+        t = (k + fraction) * h
+        k += 1
+        if k == steps and status == RUNNING:
+            t = scene.span

@@ -15,21 +15,21 @@ from ringsweep.models.belt.series import Mode
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
-from ringsweep.models.slip import Bundle, Slip, region_guards, slip
+from ringsweep.models.slip import Slip, bundled, region_guards, slip, slip_at
 from ringsweep.numerics.functions import select
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import BristleBelt
 from ringsweep.physics.forces import force_in
-from ringsweep.physics.friction.bristles import after_yield, bristle, initial_deflection, region_guard, stick_speed
+from ringsweep.physics.friction.bristles import after_yield, initial_deflection, region_guard, stick_speed
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 
 
 @absorbed
-def contact(scene, v, z, sign, region):
-    """Rate of the deflection (m/s) and its derivatives by v and z; friction K and its derivatives (s/m, 1/m)."""
-    rate, rate_v, rate_z, traction, by_v, by_z = bristle(scene.law, scene.mu_s, scene.mu_k, v, z, sign, region)
-    return rate, rate_v, rate_z, -traction, -by_v, -by_z
+def _sliding(scene, motion, x, sign, region):
+    """The :class:`Slip` of a sliding velocity and a deflection, `x`."""
+    K, slope, bundle = bundled(scene.law, (scene.mu_s, scene.mu_k), *x, sign, region)
+    return Slip(motion, x[0], (K, K), (slope, slope), 0.0, (bundle,))
 
 
 @absorbed
@@ -66,10 +66,9 @@ def _initial_state_in_space(scene):
 def _slip_in_space(scene, y, v, forcing, angle):
     sign = select(v >= 0.0, 1.0, -1.0)
     stuck = _in_band(scene, v, y[2], sign)
-    a, b = contact(scene, v, y[2], sign, BAND), contact(scene, v, y[2], sign, KINETIC)
-    rate, rate_v, rate_z, K, slope_v, slope_z = select_all(stuck, a, b)
-    motion, bundle = (y[0], force_in(scene.drive, forcing), y[1]), Bundle(rate, rate_v, rate_z, slope_z)
-    return Slip(motion, v, (K, K), (slope_v, slope_v), 0.0, (bundle,)), select(stuck, 1.0, 0.0)
+    motion = y[0], force_in(scene.drive, forcing), y[1]
+    a, b = _sliding(scene, motion, (v, y[2]), sign, BAND), _sliding(scene, motion, (v, y[2]), sign, KINETIC)
+    return select_all(stuck, a, b), select(stuck, 1.0, 0.0)
 
 
 @recorder.begin.implements(BristleBelt)
@@ -85,25 +84,25 @@ def _keep_deflection(scene, row, column, y):
 
 @modes.begin.implements(BristleBelt)
 def _begin_modes(scene):
-    t, x, z = drives.beginning(scene.drive), scene.initial_x, _deflection_at_start(scene)
+    t, z = drives.beginning(scene.drive), _deflection_at_start(scene)
     v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
+    y = scene.initial_x, v, z
     sign = 1 if v > 0.0 else -1
-    _, _, _, K, _, _ = contact(scene, v, z, 1.0, BAND)
-    forcing = drives.turn(scene.drive, t)
-    motion = x, force_in(scene.drive, forcing), v + forcing[1]
+    now = slip_at(scene, Mode(1, BAND, -1), t, y)
+    acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
-        sign = 1 if ring.acceleration(scene.body, K, K, motion)[0] > forcing[2] else -1
+        sign = 1 if acceleration > drives.turn(scene.drive, t)[2] else -1
     mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC, -1)
-    load = ring.reactions(scene.body, K, K, motion)[0]
+    load = ring.reactions(scene.body, *now.K, now.motion)[0]
     if load == 0.0:
         # The contact holds if the load begins to grow.
-        ahead = motion[2] if motion[2] != 0.0 else ring.acceleration(scene.body, K, K, motion)[0]
+        ahead = now.motion[2] if now.motion[2] != 0.0 else acceleration
         load = ring.held(scene.body, 0.0, (ahead, 0.0, 0.0), 0.0, 0.0, 0.0)[0]
         opens = load <= 0.0
     else:
         opens = load < 0.0
-    return t, (x, v, z), (SEPARATED_1 if ring.if_load_varies(scene.body, opens, False) else RUNNING), mode
+    return t, y, (SEPARATED_1 if ring.if_load_varies(scene.body, opens, False) else RUNNING), mode
 
 
 @modes.switch.implements(BristleBelt)
@@ -119,22 +118,10 @@ def _switch(scene, mode, guard, t, y):
     return RUNNING, Mode(mode.sign, region, -1), (x, v, z)
 
 
-@implicit.to_implicit.implements(BristleBelt)
-def _to_implicit(scene, forcing, y):
-    return y[0] - forcing[0], y[1], y[2]
-
-
-@implicit.from_implicit.implements(BristleBelt)
-def _from_implicit(scene, forcing, x):
-    return x[0] + forcing[0], x[1], x[2]
-
-
 @slip.implements(BristleBelt)
 def _slip(scene, mode, common, forcing, x):
-    _, v, z = x
-    motion = x[0] + forcing[0], force_in(scene.drive, forcing), v + forcing[1]
-    rate, rate_v, rate_z, K, slope_v, slope_z = contact(scene, v, z, float(mode.sign), mode.region)
-    return Slip(motion, v, (K, K), (slope_v, slope_v), 0.0, (Bundle(rate, rate_v, rate_z, slope_z),))
+    motion = x[0] + forcing[0], force_in(scene.drive, forcing), x[1] + forcing[1]
+    return _sliding(scene, motion, x[1:], float(mode.sign), mode.region)
 
 
 @region_guards.implements(BristleBelt)

@@ -8,7 +8,7 @@ from ringsweep.models.belt.bristles import recoil_speed
 from ringsweep.models.belt.force import stuck_gradient, stuck_rates
 from ringsweep.models.belt.record import with_tangent
 from ringsweep.models.belt.series import SLOW
-from ringsweep.models.interface import implicit, variation
+from ringsweep.models.interface import variation
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.bristles import region_guard
@@ -76,14 +76,6 @@ def _gradient_of_guard(scene, mode, guard, t, y, rates):
     by_x = bound - way * pull
     rate = bound_rate - way * pull_rate
     return by_x / rate if rate != 0.0 else 0.0, 0.0
-
-
-@variation.jacobian.implements(BristleBelt)
-def _bristle_jacobian(scene, mode, t, y):
-    forcing = drives.turn(scene.drive, t)
-    linear = implicit.linearise(scene, mode, (), t, forcing, implicit.to_implicit(scene, forcing, y))
-    first, second, third = linear[1]
-    return *first, *second, *third
 
 
 @_gradient.implements(BristleBelt)

@@ -8,7 +8,7 @@ bristles are deflected as in steady sliding at the launch velocity.
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import sqrt
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.inspection import slip_in_space
@@ -31,10 +31,10 @@ from ringsweep.models.ring.series import (
     with_slip,
 )
 from ringsweep.models.sliding import rate_at_rest
-from ringsweep.models.slip import Bundle, Slip, region_guards, slip
+from ringsweep.models.slip import Slip, bundled, region_guards, slip, slip_at
 from ringsweep.numerics.functions import select, sine_cosine_from
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
+from ringsweep.physics.friction.bristles import region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.physics.ring import BristleRing
 from ringsweep.physics.zones import roughest
@@ -57,20 +57,16 @@ def slip_of(scene, under, motion, x, sign, region):
         As for :func:`ringsweep.physics.friction.presliding.bristle`.
     """
     _, v, z_1, z_2 = x
-    mu_s1, mu_k1, mu_s2, mu_k2 = under
-    rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
-    rate_2, rate_v2, rate_z2, traction_2, by_v_2, by_z_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
-    first, second = Bundle(rate_1, rate_v1, rate_z1, -by_z_1), Bundle(rate_2, rate_v2, rate_z2, -by_z_2)
-    friction, slopes = (-traction_1, -traction_2), (-by_v_1, -by_v_2)
-    return Slip(motion, v / scene.body.radius, friction, slopes, 0.0, (first, second))
+    K1, slope_1, first = bundled(scene.law, under[:2], v, z_1, sign, region)
+    K2, slope_2, second = bundled(scene.law, under[2:], v, z_2, sign, region)
+    return Slip(motion, v / scene.body.radius, (K1, K2), (slope_1, slope_2), 0.0, (first, second))
 
 
 @absorbed
 def _region_guard(scene, under, v, z_1, z_2, sign, region):
     """Guard of a region, positive while the region lasts. The body counts as stuck while both contacts do."""
-    mu_s1, mu_k1, mu_s2, mu_k2 = under
-    first = region_guard(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
-    second = region_guard(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
+    first = region_guard(scene.law, *under[:2], v, z_1, sign, region)
+    second = region_guard(scene.law, *under[2:], v, z_2, sign, region)
     return min(first, second) if region == BAND else max(first, second)
 
 
@@ -116,10 +112,7 @@ def _begin(scene):
 
 @friction_and_motion.implements(BristleRing)
 def _friction_and_motion(scene, mode, t, y):
-    theta, ring_omega, _ = drives.turn(scene.drive, t)
-    phi, omega = y[0] + theta, ring.angular_velocity(scene.body, y[1], ring_omega)
-    under = coefficients_under(scene, mode)
-    now = slip_of(scene, under, (sin(phi), cos(phi), omega), y, float(mode.sign), mode.region)
+    now = slip_at(scene, mode, t, y)
     return now.K, now.motion
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import cos, inf, sin, sqrt
 from typing import NamedTuple
 
-from ringsweep.compile import inlined, unrolled
+from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zones_of
@@ -91,13 +91,7 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     slow, fast = region_guards(scene, mode, common, x)
     ahead = min(edges_ahead(scene, mode, x[0]))
     motion = x[0] + forcing[0], now.motion[2], epsilon, forcing[1]
-    return (determinant, slow, normal_1, normal_2, ahead, fast), joined(motion, deflections(x))
-
-
-@unrolled
-def deflections(length, x):
-    """Deflections of the bristles in a state."""
-    return ["return (" + "".join(f"x[{i}], " for i in range(2, length)) + ")"]
+    return (determinant, slow, normal_1, normal_2, ahead, fast), (*motion, *x[2:])
 
 
 @implicit.near_zero.implements(ring.Ring, ring.BristleRing)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from ringsweep.models.inspection import inspection, rates, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
 from ringsweep.models.ring.contacts import places_at, zones_of
-from ringsweep.models.ring.creep import deflections
 from ringsweep.models.slip import Slip
 from ringsweep.numerics.functions import opposing, sine_cosine, sine_cosine_carried, sine_cosine_near
-from ringsweep.numerics.terms import joined
 from ringsweep.physics import zones
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.ring import BristleRing, Ring, coefficients_at
@@ -57,4 +55,4 @@ def _row(scene, y, forcing):
     now = constant_step.inspect(scene, y, forcing)
     normals, places = (now.normal_1, now.normal_2), zones_of(scene, *places_at(scene, y[0] - forcing[0]))
     row = y[0], y[1], now.rates[1], *normals, forcing[1], *places, word_of_mode(scene, now)
-    return joined(row, deflections(y))
+    return *row, *y[2:]
