@@ -1,5 +1,6 @@
 """Extension of Sphinx: help of the commands, figures for the gallery, and what must be there before a build."""
 
+import html
 import os
 import sys
 from pathlib import Path
@@ -35,7 +36,7 @@ class CommandHelp(SphinxDirective):
 
 
 def collect_figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
-    """Save the figures and films that a block of a gallery script made; `ringsweep.plots` makes them without pyplot."""
+    """Show the figures, films and pages that a block of a gallery script made; no figure comes from pyplot."""
     names, paths = block_vars["example_globals"], []
     for name in [name for name, value in names.items() if isinstance(value, Figure)]:
         paths.append(next(block_vars["image_path_iterator"]))
@@ -44,7 +45,12 @@ def collect_figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[s
     for film in GALLERY.glob("*.gif"):
         paths.append(str(Path(next(block_vars["image_path_iterator"])).with_suffix(".gif")))
         film.rename(paths[-1])
-    return figure_rst(paths, gallery_conf["src_dir"])
+    shown = figure_rst(paths, gallery_conf["src_dir"])
+    for page in GALLERY.glob("*.html"):
+        inside = html.escape(page.read_text(encoding="utf-8")).replace("\n", "&#10;")
+        page.unlink()
+        shown += f'\n\n.. raw:: html\n\n    <iframe srcdoc="{inside}" style="width: 100%; height: 50em"></iframe>\n\n'
+    return shown
 
 
 def mark_older_results(app: Any, document: str, source: list[str]) -> None:

@@ -37,7 +37,7 @@ REGIME_COLOURS: dict[str, str] = {
 
 #: The colour of each word for what follows a lost contact. Their lightness falls from calm to wild.
 AFTERMATH_COLOURS: dict[str, str] = {
-    "held": "#F0E442",
+    "held": "#EFEBD0",
     "recovered": "#84CAF2",
     "open": "#CC5500",
     "tumbled": "#00507F",
