@@ -869,8 +869,10 @@ def test_history_shades_stick_for_its_duration():
 
 def test_strip_shows_the_arc_under_each_contact():
     ds = make_history()
-    strip = mesh(plots.history(ds), -1).get_array()
-    np.testing.assert_allclose((strip > 0).mean(axis=1), [(ds[z] > 0).mean() for z in ("zone_1", "zone_2")], atol=2e-3)
+    drawn = mesh(plots.history(ds), -1)
+    strip, widths = drawn.get_array(), np.diff(drawn.get_coordinates()[0, :, 0])
+    shares = [(ds[z] > 0).mean() for z in ("zone_1", "zone_2")]
+    np.testing.assert_allclose((strip > 0) @ widths / widths.sum(), shares, atol=2e-3)
     assert set(np.unique(strip[1])) == {0, 2}
 
 

@@ -31,9 +31,6 @@ _CLIPPED = ("epsilon", "friction_force")
 # Impact speeds below this share of the greatest are not shown: the last rebounds of a contact are endless.
 _WEAKEST = 1e-4
 
-# Intervals of time whose states are drawn: more than a printed panel has pixels.
-_INTERVALS = 4000
-
 # Cycles from which on a printed curve is a block; cycles that are then drawn beside it; and steps of its envelope.
 _MANY_CYCLES, _LAST_CYCLES, _STEPS = 40, 5, 200
 
@@ -286,12 +283,12 @@ def _draw_range(
 
 def _shade(axes: Axes, time: NDArray[Any], phases: NDArray[Any], explain: bool) -> None:
     """Shade times of stick and of open contacts; the legend may explain the shading."""
-    edges, phase = _by_interval(time, phases)
     stick = look.on_page(look.STICK)
     shades = ((0, stick, 1.0), (datasets.PIVOT, look.OPEN, 0.18), (datasets.FLIGHT, look.OPEN, 0.45))
     limits = axes.dataLim.frozen()
     for value, colour, alpha in shades:
-        spans = [(edges[i], edges[j] - edges[i]) for i, j in look.true_ranges(phase == value)]
+        ends = time[np.minimum(look.true_ranges(phases == value), len(time) - 1)]
+        spans = [(begin, end - begin) for begin, end in ends if end > begin]
         style: dict[str, Any] = {"color": colour, "alpha": alpha}
         style["label"] = datasets.mode_name(value) if explain and spans else None
         axes.broken_barh(spans, (0, 1), transform=axes.get_xaxis_transform(), linewidth=0, **style)
@@ -425,8 +422,9 @@ def _draw_breakaway(axes: Axes, ds: xr.Dataset, first: NDArray[Any], window: flo
 
 def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
     """Draw the strip that shows which zone lies under each contact."""
-    at = _by_interval(ds["time"].values, ds[names[0]].values)[0]
-    strip = np.array([_by_interval(ds["time"].values, ds[name].values)[1] for name in names])
+    time, arcs = ds["time"].values, np.array([ds[name].values for name in names])
+    starts = np.append(0, 1 + np.flatnonzero((arcs[:, 1:] != arcs[:, :-1]).any(axis=0)))
+    at, strip = np.append(time[starts], time[-1]), arcs[:, starts]
     surfaces = [("elsewhere", look.on_page(look.REST)), *look.arcs(int(max(1, strip.max())))]
     palette = colors.ListedColormap([colour for _, colour in surfaces])
     limits: dict[str, Any] = {"vmin": -0.5, "vmax": len(surfaces) - 0.5}
@@ -467,13 +465,6 @@ def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any], loc: Literal["le
         axes.set_ylim(low - margin, high + margin)
         ends = number_text(values[0]), number_text(values[-1])
         axes.set_title(f"axis clipped; values from {ends[0]} to {ends[1]}", fontsize=look.SMALL, loc=loc)
-
-
-def _by_interval(time: NDArray[Any], states: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Edges of equal intervals of time, and the state in the middle of each."""
-    edges = np.linspace(time[0], time[-1], _INTERVALS + 1)
-    middles = (edges[1:] + edges[:-1]) / 2
-    return edges, states[np.clip(np.searchsorted(time, middles, side="right") - 1, 0, None)]
 
 
 def _short_label(ds: xr.Dataset, name: str) -> str:

@@ -238,20 +238,18 @@ def make_room(ax: Axes) -> None:
         own.set_layout_engine("constrained")
 
 
+def size_of(ax: Axes) -> tuple[float, float]:
+    """Width and height that the layout of the figure has for the axes with their labels and legend, inches."""
+    figure: Any = ax.figure
+    across, up = ax.get_position().size
+    if spec := ax.get_subplotspec():
+        across, up = len(spec.colspan) / spec.get_gridspec().ncols, len(spec.rowspan) / spec.get_gridspec().nrows
+    return float(across * figure.bbox.width / figure.dpi), float(up * figure.bbox.height / figure.dpi)
+
+
 def width_of(ax: Axes) -> float:
     """Width that the layout of the figure has for the axes with their labels and legend, inches."""
-    figure: Any = ax.figure
-    spec = ax.get_subplotspec()
-    share = len(spec.colspan) / spec.get_gridspec().ncols if spec else ax.get_position().width
-    return float(share * figure.bbox.width / figure.dpi)
-
-
-def height_of(ax: Axes) -> float:
-    """Height that the layout of the figure has for the axes with their labels, inches."""
-    figure: Any = ax.figure
-    spec = ax.get_subplotspec()
-    share = len(spec.rowspan) / spec.get_gridspec().nrows if spec else ax.get_position().height
-    return float(share * figure.bbox.height / figure.dpi)
+    return size_of(ax)[0]
 
 
 def is_narrow(inches: float) -> bool:
@@ -261,11 +259,11 @@ def is_narrow(inches: float) -> bool:
 
 def label_axes(ax: Axes, x: str, y: str) -> None:
     """Write the labels of both axes, in as many lines as their widths need."""
-    # A legend below narrow axes takes a part of the height.
-    share = 0.5 if is_narrow(width_of(ax)) else 0.75
+    width, height = size_of(ax)
     # Ticks and the label of the vertical axis take a part of the width.
-    ax.set_xlabel(folded([x], width_of(ax) - MARGIN))
-    ax.set_ylabel(folded([y], share * height_of(ax)))
+    ax.set_xlabel(folded([x], width - MARGIN))
+    # A legend below narrow axes takes a part of the height.
+    ax.set_ylabel(folded([y], (0.5 if is_narrow(width) else 0.75) * height))
 
 
 def letters(inches: float) -> int:

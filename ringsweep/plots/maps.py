@@ -533,7 +533,7 @@ class Map:
         """Draw one colour bar beside the panels."""
         bar = cm.ScalarMappable(self.scale.norm, self.scale.colours)
         ticks = ticker.MaxNLocator(integer=True) if self.data.dtype.kind in "iu" else None
-        height = 0.75 * look.height_of(panels[0]) * (1 + (len(panels) > 1))
+        height = 0.75 * look.size_of(panels[0])[1] * (1 + (len(panels) > 1))
         look.colour_bar(bar, panels, look.folded([labels.axis_label(self.data, self.ds)], height), ticks)
 
 
