@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -108,12 +108,6 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
     if "mu" in friction and friction.get("law") != TABLE_LAW and of_formula:
         found[FORMULA] = _law(Definition(friction["mu"], friction.get("at_rest")), "scene.friction")
     return found
-
-
-def keys_of(laws: Collection[str]) -> tuple[str, ...]:
-    """Keys of the section ``friction`` that define some laws."""
-    of_formula, of_table = ("mu", "at_rest"), ("file", *TABLES["friction"])
-    return ("laws", *(of_formula if FORMULA in laws else ()), *(of_table if TABLE_LAW in laws else ()))
 
 
 def read_curve(doc: Document, friction: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -15,7 +15,6 @@ from ringsweep.config.own import (
     FORMULA,
     TABLE_LAW,
     keep_definitions,
-    keys_of,
     law_of_curve,
     laws_with,
     own_drive,
@@ -25,7 +24,7 @@ from ringsweep.config.own import (
 )
 from ringsweep.config.record import read_record
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion, warn_once
-from ringsweep.config.tables import TABLES, read_samples
+from ringsweep.config.tables import INTERPOLATIONS, TABLES, read_samples
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
@@ -260,19 +259,17 @@ def law_choice(model: str, own: Mapping[str, type]) -> Choice:
     return Choice("friction law", tuple(dict.fromkeys([*MODELS[model].laws, *own, FORMULA, TABLE_LAW])))
 
 
-def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...]:
+def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
     """Paths of a scene that are no numeric parameters."""
-    sections = ["drive"] if drive == "table" else []
-    formulas = ["drive.theta"] if drive == FORMULA else []
-    if _takes_force(model):
-        sections.append("force")
-        formulas.append("force.formula")
-    return (
-        *formulas,
-        *("model", LAW, "drive.law"),
-        *(f"{section}.{name}" for section in sections for name in (*TABLES[section], "file", "interpolate")),
-        *(f"friction.{name}" for name in keys_of(laws)),
-    )
+    yield from ("model", LAW, "drive.law", "friction.laws")
+    takes_force = _takes_force(model)
+    by_formula = {"friction.mu": FORMULA in laws, "friction.at_rest": FORMULA in laws}
+    by_formula |= {"drive.theta": drive == FORMULA, "force.formula": takes_force}
+    yield from (path for path, is_used in by_formula.items() if is_used)
+    by_table = {"drive": drive == "table", "force": takes_force, "friction": TABLE_LAW in laws}
+    for section in (section for section, is_used in by_table.items() if is_used):
+        keys = *TABLES[section], "file", *(["interpolate"] if section in INTERPOLATIONS else [])
+        yield from (f"{section}.{key}" for key in keys)
 
 
 @lru_cache(maxsize=4096)

@@ -49,26 +49,26 @@ def schema() -> dict[str, Any]:
                     meanings.append(parameter)
     for path in [path for path in known if path.startswith("friction.rest.")]:
         known[as_named(path, "elsewhere")] = known[path]
-    leaves = {path: _any_of([_number(parameter) for parameter in meanings]) for path, meanings in known.items()}
-    joins = INTERPOLATIONS.items()
+    leaves = {path: _any(*map(_number, meanings)) for path, meanings in known.items()}
+    tables = {f"{of}.{name}": _list(_number(p)) for of, columns in TABLES.items() for name, p in columns.items()}
+    for of, columns in TABLES.items():
+        header = ", ".join(f"{name} ({p.unit})".removesuffix(" (1)") for name, p in columns.items())
+        tables[f"{of}.file"] = _text(f"CSV file with columns {header.replace('time', 't')}")
     law_by_formula = _section({"mu": _formula(), "at_rest": _at_rest()}, "mu")
+    drives = _meanings(DRIVES) | {FORMULA: "A formula of the time, under theta"}
     scene = _nest(
         {
-            "model": _names(MODELS, "what moves"),
+            "model": _word("what moves", _meanings(MODELS)),
             LAW: _laws("friction law; may be missing where sweep goes through laws"),
             "friction.laws": _open("friction laws by formula: name -> mu, at_rest", law_by_formula),
-            "friction.mu": _any_of([_formula(), _list(_number(TABLES["friction"]["mu"]))]),
             "friction.at_rest": _at_rest(),
-            "friction.v": _list(_number(TABLES["friction"]["v"])),
-            "friction.file": _text("CSV file with columns v (m/s), mu"),
-            "drive.law": _names(DRIVES, "how the ring is driven", {FORMULA: "A formula of the time, under theta"}),
+            "drive.law": _word("how the ring is driven", drives),
             "initial.from": _text("result file of the run on the belt that goes on"),
-            "drive.file": _text("CSV file with columns t (s), theta (rad)"),
-            "force.file": _text("CSV file with columns t (s), force (N)"),
-            **{f"{of}.{name}": _list(_number(p)) for of in ("drive", "force") for name, p in TABLES[of].items()},
-            **{f"{of}.interpolate": _word("what joins the rows of the table", names) for of, names in joins},
-            "drive.theta": _any_of([_formula("angle or displacement", TIME), _list(_number(TABLES["drive"]["theta"]))]),
             "force.formula": _formula("force on the body, N,", TIME),
+            **tables,
+            **{f"{of}.interpolate": _word("what joins the rows of the table", w) for of, w in INTERPOLATIONS.items()},
+            "friction.mu": _any(_formula(), tables["friction.mu"]),
+            "drive.theta": _any(_formula("angle or displacement", TIME), tables["drive.theta"]),
             **leaves,
         }
     )
@@ -102,18 +102,18 @@ def _number(parameter: Parameter) -> dict[str, Any]:
     return {"description": about, "anyOf": [bounds, {"type": "string"}]}
 
 
-def _names(registry: Mapping[str, Any], about: str, more: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Names of a registry, and further ones with their meanings."""
-    meanings = {name: _first_line(entry) for name, entry in registry.items()} | dict(more or {})
-    return {"description": about, "type": "string", "oneOf": _constants(meanings)}
+def _meanings(registry: Mapping[str, Any]) -> dict[str, str]:
+    """Names of a registry with the first lines of their docstrings, without markup, for editors to show."""
+    lines = {name: (entry.__doc__ or "").split("\n")[0] for name, entry in registry.items()}
+    return {name: re.sub(r":math:`([^`]*)`", lambda m: m[1].replace("\\", ""), line) for name, line in lines.items()}
 
 
 def _laws(about: str) -> dict[str, Any]:
     """Names of friction laws: those of the package, `formula`, `table`, and names that a user gives."""
     formula, table = "A formula of the sliding speed, under mu", "Measured friction: a file, or lists v and mu"
-    known = _names(LAWS, about, {FORMULA: formula, TABLE_LAW: table})
+    known = _constants(_meanings(LAWS) | {FORMULA: formula, TABLE_LAW: table})
     own = {"description": "a law of the section laws, or of the Python session", "minLength": 1}
-    return {"description": about, "type": "string", "anyOf": [*known["oneOf"], own]}
+    return {"description": about, "type": "string", "anyOf": [*known, own]}
 
 
 _VALUE, _TEXT, _FLAG = {"type": ["number", "string"]}, {"type": "string"}, {"type": "boolean"}
@@ -129,12 +129,6 @@ def _formula(what: str = "friction coefficient", of: str = SPEED) -> dict[str, A
 def _at_rest() -> dict[str, Any]:
     about = "coefficient up to which friction holds at rest; without it the law is smooth"
     return {"description": about, "enum": [*COEFFICIENTS]}
-
-
-def _first_line(documented: Any) -> str:
-    """First line of a docstring, without markup, for editors to show."""
-    line: str = (documented.__doc__ or "").split("\n")[0]
-    return re.sub(r":math:`([^`]*)`", lambda formula: formula[1].replace("\\", ""), line)
 
 
 def _nest(leaves: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
@@ -165,12 +159,9 @@ def _text(about: str) -> dict[str, Any]:
     return {"description": about, **_TEXT}
 
 
-def _any_of(options: list[dict[str, Any]]) -> dict[str, Any]:
-    return options[0] if len(options) == 1 else {"anyOf": options}
-
-
-def _either(about: str, *options: Mapping[str, Any]) -> dict[str, Any]:
-    return {"description": about, "anyOf": list(options)}
+def _any(*options: Mapping[str, Any], about: str = "") -> dict[str, Any]:
+    described = {"description": about} if about else {}
+    return {**described, **(options[0] if len(options) == 1 else {"anyOf": list(options)})}
 
 
 def _word(about: str, meanings: Mapping[str, str]) -> dict[str, Any]:
@@ -196,10 +187,10 @@ def _keys(keys: Keys, **others: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 def _solver() -> dict[str, Any]:
     methods: list[dict[str, Any]] = [{"type": "string", "enum": list(METHODS)}]
-    for name, method in METHODS.items():
-        options = {"method": {"const": name, "description": _first_line(method)}, **_keys(options_of(method))}
+    for name, about in _meanings(METHODS).items():
+        options = {"method": {"const": name, "description": about}, **_keys(options_of(METHODS[name]))}
         methods.append(_section(options, "method"))
-    return _either("how time advances", *methods)
+    return _any(*methods, about="how time advances")
 
 
 def _sweep(paths: list[str]) -> dict[str, Any]:
@@ -221,10 +212,10 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     return _section(
         {
             "grid": _open(grid, axis, propertyNames=together, properties=of_laws),
-            "refine": _either(boundaries, _FLAG, _section(refined)),
-            "follow": _either(which, _TEXT, followed),
+            "refine": _any(_FLAG, _section(refined), about=boundaries),
+            "follow": _any(_TEXT, followed, about=which),
             "sample": _sample(together, axis),
-            "points": _either(points, _TEXT, columns),
+            "points": _any(_TEXT, columns, about=points),
         }
     )
 
@@ -237,7 +228,7 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
     about = "[least value, greatest value], or mean ± tolerance, which may be in per cent"
     kinds["uniform"] = {"description": about, "anyOf": [kinds["uniform"], _TEXT]}
     columns = {"type": "object", "additionalProperties": _list(_VALUE)}
-    kinds["values"] = _either("values, each as probable as the others", _list(_VALUE), columns)
+    kinds["values"] = _any(_list(_VALUE), columns, about="values, each as probable as the others")
     kinds["file"] = _text("CSV file with a column for each path; a row is a draw")
     kinds["over"] = _text("path that the draw is multiplied by")
     drawn = "path -> distribution; paths with commas between them are drawn together"
