@@ -18,6 +18,9 @@ OUTCOMES = (
 #: Share of the span after which the exponent is measured, and number of blocks of the rest.
 _SKIPPED, _BLOCKS = 0.25, 24
 
+# Rounding of the logarithm of the growth between two observations.
+_ROUNDING = 2.0**-52
+
 
 class Flow(NamedTuple):
     """Derivative of a state by an earlier one: the matrix, row by row, and the logarithm of its determinant.
@@ -64,7 +67,8 @@ class Multipliers(NamedTuple):
     rate_1, rate_2 : float
         Logarithms of the magnitudes over the period, 1/s.
     change_1, change_2 : float
-        How much the rates differ from those of the lap before, 1/s.
+        How much the rates differ from those of the lap before, or half of what this was for the lap before, 1/s: among
+        changes that are but rounding, one may be small by chance.
     """
 
     first: float
@@ -90,6 +94,8 @@ class Tangent(NamedTuple):
         A disturbance at the last observation, of length 1.
     growth : float
         Logarithm of its growth.
+    observations : float
+        Number of the observations of which it is the sum.
     blocks : Blocks
     rates, entry : tuple of float
         Rates of the state at the end of the last interval, and at the beginning of the present step.
@@ -105,6 +111,7 @@ class Tangent(NamedTuple):
     step: Flow
     vector: Any
     growth: float
+    observations: float
     blocks: Blocks
     rates: Any
     entry: Any
@@ -246,7 +253,7 @@ def undisturbed(asked, scene, t):
     zero, unit = _scaled(vector, 0.0), Flow(_unit(vector), 0.0)
     blocks = Blocks(-1.0, 0.0, 0.0, t, 0.0, t, 0.0, _SKIPPED * scene.span)
     multipliers = Multipliers(nan, nan, nan, nan, nan, nan, inf, inf)
-    return Tangent(unit, unit, vector, 0.0, blocks, zero, zero, zero, 1.0, multipliers)
+    return Tangent(unit, unit, vector, 0.0, 0.0, blocks, zero, zero, zero, 1.0, multipliers)
 
 
 @inlined
@@ -301,7 +308,16 @@ def observed(tangent, scene, before, cycles, t, duration):
     forced = scene.forcing_period < inf
     ends = not forced or (at_end and cycles.count != before.count)
     blocks = _blocks(r.blocks, scene.span, t, growth, ends)
-    return Tangent(lap, unit, vector, growth, blocks, r.rates, r.entry, r.gradient, r.keeps, multipliers)
+    return Tangent(
+        lap, unit, vector, growth, r.observations + 1.0, blocks, r.rates, r.entry, r.gradient, r.keeps, multipliers
+    )
+
+
+@inlined
+def _change(rate, earlier, change):
+    """Change of a rate, 1/s, after a lap in which it was `change`, NaN before the second one."""
+    now = abs(rate - earlier) if rate != earlier else 0.0
+    return max(now, 0.5 * change) if change < inf else now
 
 
 @inlined
@@ -312,8 +328,8 @@ def _multipliers(vector, flow, share, period, earlier):
     if share != 1.0:
         # The argument of a root is not unique.
         angle_1, angle_2 = nan if first > 0.0 else 0.0, nan if second > 0.0 else 0.0
-    change_1 = abs(rate_1 - earlier.rate_1) if rate_1 != earlier.rate_1 else 0.0
-    change_2 = abs(rate_2 - earlier.rate_2) if rate_2 != earlier.rate_2 else 0.0
+    change_1 = _change(rate_1, earlier.rate_1, earlier.change_1)
+    change_2 = _change(rate_2, earlier.rate_2, earlier.change_2)
     return Multipliers(first**share, second**share, angle_1, angle_2, rate_1, rate_2, change_1, change_2)
 
 
@@ -346,7 +362,9 @@ def exponent(tangent):
     b = tangent.blocks
     if b.number <= 1.0:
         return nan, nan
-    return (b.growth - b.first_growth) / (b.t - b.first_t), sqrt(b.squares / (b.number * (b.number - 1.0)))
+    duration = b.t - b.first_t
+    error = sqrt(b.squares / (b.number * (b.number - 1.0))) + _ROUNDING * tangent.observations / duration
+    return (b.growth - b.first_growth) / duration, error
 
 
 @feature("outcome")
@@ -354,13 +372,14 @@ def with_exponent(tangent, outcome, period, scene):
     """Outcome of a run of this period, s, with exponent, its error and multipliers."""
     m = tangent.multipliers
     rate, error = exponent(tangent)
+    rounding = _ROUNDING * tangent.observations / scene.span
     if isnan(period) or isnan(m.first):
         return joined(outcome, (rate, error, nan, nan, nan, nan))
     if scene.forcing_period == inf:
         # A shift in time neither grows nor decays, and says nothing.
-        rate, error = m.rate_2, m.change_2
+        rate, error = m.rate_2, m.change_2 + rounding
     elif m.first > 0.0 or isnan(rate):
         # The mean of the blocks still holds the approach to the periodic motion. What is left of it shrinks by the
         # multiplier in each lap, and so do the changes.
-        rate, error = m.rate_1, m.change_1 / (1.0 - m.first) if m.first < 1.0 else m.change_1
+        rate, error = m.rate_1, (m.change_1 / (1.0 - m.first) if m.first < 1.0 else m.change_1) + rounding
     return joined(outcome, (rate, error, m.first, m.second, m.angle_1, m.angle_2))
