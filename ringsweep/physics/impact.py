@@ -221,12 +221,20 @@ def _couplings(mass, moment, a, b):
     cosine = a.cosine * b.cosine + a.sine * b.sine
     sine = a.sine * b.cosine - a.cosine * b.sine
     m, j = 1.0 / mass, 1.0 / moment
-    return (
-        m * cosine + j * a.lever_n * b.lever_n,
-        -m * sine + j * a.lever_n * b.lever_t,
-        m * sine + j * a.lever_t * b.lever_n,
-        m * cosine + j * a.lever_t * b.lever_t,
-    )
+    by_opening = m * cosine + j * a.lever_n * b.lever_n, -m * sine + j * a.lever_n * b.lever_t
+    return by_opening, (m * sine + j * a.lever_t * b.lever_n, m * cosine + j * a.lever_t * b.lever_t)
+
+
+@inlined
+def _change(row, impulses):
+    """Change of a velocity by impulses inwards and along the race at contact 1, and at contact 2."""
+    return row[0] * impulses[0] + row[1] * impulses[1] + row[2] * impulses[2] + row[3] * impulses[3]
+
+
+@inlined
+def _by_unknowns(row, k_1, k_2, sticks_1):
+    """Change of a velocity by the normal impulses, with friction k of each, and by that of a contact that sticks."""
+    return row[0] + k_1 * row[1], row[2] + k_2 * row[3], row[1] if sticks_1 else row[3]
 
 
 @inlined
@@ -248,13 +256,13 @@ def _shared_stick(mu, couplings, wanted, scale):
     `wanted` are the changes of opening and slip at contact 1 and of opening at contact 2. The impulses that give them
     form a line. The cones of friction leave an interval of it, whose middle is taken, or nothing.
     """
-    (nn_11, nt_11, tn_11, tt_11), (nn_12, nt_12, tn_12, tt_12), (nn_21, nt_21, _, _), (nn_22, nt_22, _, _) = couplings
+    opening_1, slip_1, opening_2, _ = couplings
     d_1, s_1, d_2 = wanted
-    matrix = (nn_11, nt_11, nn_12), (tn_11, tt_11, tn_12), (nn_21, nt_21, nn_22)
+    matrix = opening_1[:3], slip_1[:3], opening_2[:3]
     n_1, t_1, n_2, whole = _solve_three(matrix, (d_1, s_1, d_2))
     if whole == 0.0:
         return False, 0.0, 0.0, 0.0, 0.0
-    by_1, by_t, by_2, _ = _solve_three(matrix, (-nt_12, -tt_12, -nt_22))
+    by_1, by_t, by_2, _ = _solve_three(matrix, (-opening_1[3], -slip_1[3], -opening_2[3]))
     n_1, t_1, n_2 = n_1 / whole, t_1 / whole, n_2 / whole
     by_1, by_t, by_2 = by_1 / whole, by_t / whole, by_2 / whole
     # Four conditions p + q z >= 0 on the impulse z along the race at contact 2.
@@ -302,6 +310,8 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
     """
     c_11, c_12 = _couplings(mass, moment, first, first), _couplings(mass, moment, first, second)
     c_21, c_22 = _couplings(mass, moment, second, first), _couplings(mass, moment, second, second)
+    rows = c_11[0] + c_12[0], c_11[1] + c_12[1], c_21[0] + c_22[0], c_21[1] + c_22[1]
+    unit_1, unit_2 = rows[0][0], rows[2][2]
     before = first.opening, first.slip, second.opening, second.slip
     aims = (
         -restitution[0] * before[0] if before[0] < 0.0 else 0.0,
@@ -313,66 +323,52 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
     if touching[1]:
         speed = max(speed, max(abs(before[2]), abs(before[3])))
     least = _ROUNDING * speed
-    least_impulse, unit_mass = least / min(c_11[0], c_22[0]), max(c_11[0], c_22[0])
+    least_impulse, unit_mass = least / min(unit_1, unit_2), max(unit_1, unit_2)
     solutions = 0
     best = Impulses(0, 0.0, 0.0, 0.0, 0.0, before[0], before[1], before[2], before[3], 0.0, 0.0)
     # Several modes may give the same velocities; the first is kept. Two sticking contacts come first: only their mode
     # knows the middle of the impulses that friction allows, the others are ends of their range.
     for mode_1 in range(_STICK if touching[0] else _OPEN, -1, -1):
         for mode_2 in range(_STICK if touching[1] else _OPEN, -1, -1):
-            t_1 = t_2 = 0.0
-            found = True
             if mode_1 == _STICK and mode_2 == _STICK:
                 wanted = aims[0] - before[0], -before[1], aims[1] - before[2]
-                found, n_1, t_1, n_2, t_2 = _shared_stick(mu, (c_11, c_12, c_21, c_22), wanted, 1.0 / c_11[0])
+                found, n_1, t_1, n_2, t_2 = _shared_stick(mu, rows, wanted, 1.0 / unit_1)
             else:
                 k_1 = -mu[0] if mode_1 == _FORWARD else mu[0] if mode_1 == _BACKWARD else 0.0
                 k_2 = -mu[1] if mode_2 == _FORWARD else mu[1] if mode_2 == _BACKWARD else 0.0
-                one = 1.0, 0.0, 0.0
-                two = 0.0, 1.0, 0.0
-                three = 0.0, 0.0, 1.0
+                sticks_1, sticks_2 = mode_1 == _STICK, mode_2 == _STICK
+                one, two, three = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
                 right_1 = right_2 = right_3 = 0.0
-                if mode_1 == _STICK:
-                    three = c_11[2], c_12[2] + c_12[3] * k_2, c_11[3]
-                    right_3 = -before[1]
-                elif mode_2 == _STICK:
-                    three = c_21[2] + c_21[3] * k_1, c_22[2], c_22[3]
-                    right_3 = -before[3]
                 if mode_1 != _OPEN:
-                    by_t = c_11[1] if mode_1 == _STICK else c_12[1] if mode_2 == _STICK else 0.0
-                    one = c_11[0] + c_11[1] * k_1, c_12[0] + c_12[1] * k_2, by_t
-                    right_1 = aims[0] - before[0]
+                    one, right_1 = _by_unknowns(rows[0], k_1, k_2, sticks_1), aims[0] - before[0]
                 if mode_2 != _OPEN:
-                    by_t = c_21[1] if mode_1 == _STICK else c_22[1] if mode_2 == _STICK else 0.0
-                    two = c_21[0] + c_21[1] * k_1, c_22[0] + c_22[1] * k_2, by_t
-                    right_2 = aims[1] - before[2]
+                    two, right_2 = _by_unknowns(rows[2], k_1, k_2, sticks_1), aims[1] - before[2]
+                if sticks_1:
+                    three, right_3 = _by_unknowns(rows[1], k_1, k_2, True), -before[1]
+                elif sticks_2:
+                    three, right_3 = _by_unknowns(rows[3], k_1, k_2, False), -before[3]
                 n_1, n_2, t, whole = _solve_three((one, two, three), (right_1, right_2, right_3))
                 if whole == 0.0:
                     continue
-                n_1, n_2, t = n_1 / whole, n_2 / whole, t / whole
-                t_1 = t if mode_1 == _STICK else k_1 * n_1
-                t_2 = t if mode_2 == _STICK else k_2 * n_2
-            rough = least + _CANCELLED * (c_11[0] * abs(n_1) + c_22[0] * abs(n_2))
+                n_1, n_2, t, found = n_1 / whole, n_2 / whole, t / whole, True
+                t_1, t_2 = t if sticks_1 else k_1 * n_1, t if sticks_2 else k_2 * n_2
+            rough = least + _CANCELLED * (unit_1 * abs(n_1) + unit_2 * abs(n_2))
             # Most modes need an impulse that pulls, or more friction than there is.
-            pulls = min(c_11[0] * n_1, c_22[0] * n_2) < -rough
-            if not found or pulls or abs(t_1) * c_11[0] > mu[0] * c_11[0] * n_1 + rough:
+            short = max(unit_1 * (abs(t_1) - mu[0] * n_1), unit_2 * (abs(t_2) - mu[1] * n_2))
+            if not found or min(unit_1 * n_1, unit_2 * n_2) < -rough or short > rough:
                 continue
-            if abs(t_2) * c_22[0] > mu[1] * c_22[0] * n_2 + rough:
-                continue
-            o_1 = before[0] + c_11[0] * n_1 + c_11[1] * t_1 + c_12[0] * n_2 + c_12[1] * t_2
-            s_1 = before[1] + c_11[2] * n_1 + c_11[3] * t_1 + c_12[2] * n_2 + c_12[3] * t_2
-            o_2 = before[2] + c_21[0] * n_1 + c_21[1] * t_1 + c_22[0] * n_2 + c_22[1] * t_2
-            s_2 = before[3] + c_21[2] * n_1 + c_21[3] * t_1 + c_22[2] * n_2 + c_22[3] * t_2
+            impulse = n_1, t_1, n_2, t_2
+            o_1, s_1 = before[0] + _change(rows[0], impulse), before[1] + _change(rows[1], impulse)
+            o_2, s_2 = before[2] + _change(rows[2], impulse), before[3] + _change(rows[3], impulse)
             # The law once more, from the impulses and the velocities.
             violation = 0.0
             for touches, n, along, opens, slides, aim, coefficient, unit in (
-                (touching[0], n_1, t_1, o_1, s_1, aims[0], mu[0], c_11[0]),
-                (touching[1], n_2, t_2, o_2, s_2, aims[1], mu[1], c_22[0]),
+                (touching[0], n_1, t_1, o_1, s_1, aims[0], mu[0], unit_1),
+                (touching[1], n_2, t_2, o_2, s_2, aims[1], mu[1], unit_2),
             ):
                 if touches:
-                    impulse = unit * n
-                    wrong = max(-impulse, aim - opens)
-                    wrong = max(wrong, min(impulse, opens - aim))
+                    wrong = max(-unit * n, aim - opens)
+                    wrong = max(wrong, min(unit * n, opens - aim))
                     wrong = max(wrong, unit * (abs(along) - coefficient * n))
                     # What slides feels all of its friction, against the slip.
                     short = unit * (coefficient * n + along * (1.0 if slides > 0.0 else -1.0))
