@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection
+from functools import cache
 from math import inf, nan
 from typing import Any
 
@@ -93,11 +94,15 @@ def feature(otherwise: str, *, of: type | Collection[type] = (), absorb: bool = 
 
     def decorate(body: Callable[..., Any]) -> Any:
         names = list(inspect.signature(body).parameters)
-        scope = {"inf": inf, "nan": nan} | body.__globals__
-        without = function_from_lines(", ".join(names), [f"return {otherwise}"], scope)
+
+        @cache
+        def without() -> Any:
+            # By now the module has all its names.
+            scope = {"inf": inf, "nan": nan} | body.__globals__
+            return function_from_lines(", ".join(names), [f"return {otherwise}"], scope)
 
         def chosen(first: type | None) -> Any:
-            return body if (first in having if having else first is not tuple) else without
+            return body if (first in having if having else first is not tuple) else without()
 
         def typed(*kinds: Any) -> Any:
             return chosen(tuple if kinds[0] == types.Tuple(()) else getattr(kinds[0], "instance_class", None))

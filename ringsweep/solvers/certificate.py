@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.models import tangent
-from ringsweep.models.interface.audit import disobeys, least_scales, same_statistics, undecided
+from ringsweep.models.interface.audit import least_scales, of_events, same_statistics, undecided
 from ringsweep.quantities.flags import (
     ANSWERS_DIFFER,
     CERTIFIED,
@@ -131,7 +131,7 @@ def judged(
     reasons = {
         NO_RESULT: one.regime == FAILED,
         ANSWERS_DIFFER: ~agree(rows, second_rows, outcomes),
-        LAW_NOT_OBEYED: disobeys(batch, one) | disobeys(batch, other),
+        LAW_NOT_OBEYED: of_events(batch, one)[0] | of_events(batch, other)[0],
         CLOSE_CALL: undecided(batch, one, other, fall_rates),
         NOT_FINITE: ~np.isfinite(rows[:, needed]).all(axis=1),
     }

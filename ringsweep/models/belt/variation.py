@@ -19,11 +19,6 @@ from ringsweep.physics.friction.velocity import stiction_band
 _SMALL = 1e-4
 
 
-@variation.asked.implements(Belt, BristleBelt)
-def _asked(scene):
-    return scene.asked
-
-
 @variation.due.implements(Belt, BristleBelt)
 def _due(scene, record):
     return min(_end_of_cycle(scene.asked, record), section.due(scene.section, record))

@@ -86,27 +86,6 @@ def undecided(batch, one, other, fall_rates):
 
 
 @hook(optional=True)
-def disobeys(batch, one):
-    """Which runs of a batch have an outcome that no motion obeying the law has, beside what the audit finds.
-
-    It runs outside kernels and may use NumPy.
-
-    Parameters
-    ----------
-    batch : NamedTuple
-        Cells. The type of the batch decides which body runs.
-    one : SimpleNamespace
-        Outcomes of the runs: arrays of shape ``(cells,)``, by name.
-
-    Returns
-    -------
-    ndarray of bool, shape ``(cells,)``
-        By default false for all cells.
-    """
-    return np.zeros(len(batch.span), dtype=bool)
-
-
-@hook(optional=True)
 def same_statistics(batch, one, other):
     """Which runs of a batch have the same statistics as other runs of the same cells, within sampling error.
 
@@ -168,8 +147,8 @@ def least_scales(batch):
 
 
 @hook(optional=True)
-def magnified(batch, one):
-    """Which runs had events that magnify the errors of what was before, as impacts do, and what their model leaves out.
+def of_events(batch, one):
+    """What the events of the runs of a batch, such as impacts, say of the runs.
 
     It runs outside kernels.
 
@@ -183,10 +162,11 @@ def magnified(batch, one):
     Returns
     -------
     tuple of ndarray
-        Booleans, and relative errors that no tolerance of the steps shows; both of shape ``(cells,)``. By default false
-        and 0 for all cells.
+        Whether an event disobeys its law; whether events magnify the errors of what was before; and what their model
+        leaves out: relative errors that no tolerance of the steps shows. Of shape ``(cells,)``, by default false and 0.
     """
-    return np.zeros(len(batch.span), dtype=bool), np.zeros(len(batch.span))
+    none = np.zeros(len(batch.span), dtype=bool)
+    return none, none, np.zeros(len(batch.span))
 
 
 #: Functions without a default.

@@ -16,7 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import hook
+from ringsweep.compile import feature, hook
+from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.ring import Ring
 from ringsweep.quantities.parameters import Leaf
 
 
@@ -40,10 +42,10 @@ class Exponent(NamedTuple):
         return cls(frequency, (1.0 / frequency, np.ones(len(frequency)), *[1.0 / frequency] * bristles))
 
 
-@hook(optional=True)
+@feature("()", of=(Belt, BristleBelt, Ring))
 def asked(scene):
     """What a scene asks for: :class:`Exponent`, or an empty tuple."""
-    return ()
+    return scene.asked
 
 
 @hook(optional=True)

@@ -35,20 +35,13 @@ class Asked(NamedTuple):
     pace: Leaf
 
 
-class Last(NamedTuple):
-    """The last observation: time, s, angle of the body, rad, and angular velocity, rad/s."""
-
-    t: float
-    x: float
-    velocity: float
-
-
 class LongRun(NamedTuple):
     """Cycles up to now, and what is asked for beside them.
 
     Attributes
     ----------
-    last : Last
+    last : Interval
+        The interval that ends with the last observation.
     low, high : float
         Least and greatest angle since the end of the last cycle, rad.
     cycles : Cycles
@@ -58,7 +51,7 @@ class LongRun(NamedTuple):
         Points of the section; an empty tuple if none is asked for.
     """
 
-    last: Last
+    last: Interval
     low: float
     high: float
     cycles: Cycles
@@ -76,7 +69,7 @@ def launched(asked, scene, t, seen):
     phi, omega = seen[0], seen[1]
     first, start = cycles.end_of(scene, scene.forcing_period, 1.0), Mark(t, phi, omega, 0.0, 0.0)
     started = cycles.none_yet(asked, first, start)
-    return LongRun(Last(t, phi, omega), phi, phi, started, tangent.undisturbed(scene.asked, scene, t), ())
+    return LongRun(Interval(t, 0.0, phi, omega), phi, phi, started, tangent.undisturbed(scene.asked, scene, t), ())
 
 
 @feature("long_run")
@@ -121,7 +114,7 @@ def continued(long_run, scene, stick_time, t, duration, seen):
         cycles_now = cycles.closed(scene, c, mark, count, True, high - low, fast, period)
         low = high = mark.x
     return LongRun(
-        Last(t, phi, omega),
+        now,
         low,
         high,
         cycles_now,

@@ -19,11 +19,6 @@ from ringsweep.physics.ring import Ring
 _SMALL = 1e-5
 
 
-@variation.asked.implements(Ring)
-def _asked(scene):
-    return scene.asked
-
-
 @inlined
 def _with(record, new):
     """Record with another tangent."""

@@ -121,11 +121,6 @@ def _all_lost(one):
     return SimpleNamespace(**vars(one) | {"separating_contact": contacts})
 
 
-@audit.disobeys.implements(ImpactRing)
-def _disobeys(batch, one):
-    return ~(one.impact_violation <= _MOST_VIOLATION)
-
-
 # Share by which the restitution of a second run differs: some rounding errors.
 _DISTURBANCE = 1e-14
 
@@ -142,7 +137,7 @@ def _least_scales(batch):
     return rates | {"m": reach, "m s-1": speed, "N s": body.mass * speed, "J": body.mass * speed * speed}
 
 
-@audit.magnified.implements(ImpactRing)
-def _magnified(batch, one):
+@audit.of_events.implements(ImpactRing)
+def _of_events(batch, one):
     # Each loss of a contact ends with rebounds that are summed.
-    return one.impacts > 0.0, SUMMED * one.separations
+    return ~(one.impact_violation <= _MOST_VIOLATION), one.impacts > 0.0, SUMMED * one.separations
