@@ -29,7 +29,7 @@ from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.cpu import CPUContext
 from numba.core.datamodel.models import ArrayModel
 from numba.core.runtime.context import NRTContext
-from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.typed_passes import InlineOverloads, IRLegalization, NativeLowering, NopythonRewrites
 from numba.core.typing.context import Context
 from numba.core.typing.templates import AbstractTemplate, infer, infer_global
 from numba.core.untyped_passes import InlineClosureLikes, WithLifting
@@ -155,6 +155,17 @@ class _ReferenceCounts(NRTContext):
 @cache
 def _holds_arrays(models: Any, kind: Any) -> bool:
     return bool(models[kind].contains_nrt_meminfo())
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _ArrayReleases(IRLegalization):
+    """Instructions at the end of the life of variables, in functions that have arrays with reference counts."""
+
+    _name = "array_releases"
+
+    def run_pass(self, state: Any) -> bool:
+        models = state.targetctx.data_model_manager
+        return any(_holds_arrays(models, kind) for kind in state.typemap.values()) and bool(super().run_pass(state))
 
 
 class _Target(CPUContext):
@@ -293,10 +304,10 @@ class _KernelCompiler(CompilerBase):
     def _passes(cls, plain: bool) -> Any:
         """Numba's passes, without those that are not needed; a `plain` function calls nothing that Numba inlines."""
         whole = DefaultPassBuilder.define_nopython_pipeline(StateDict(flags=Flags(), func_ir=None))
-        passes = _Passes(whole.pipeline_name)
+        passes, own = _Passes(whole.pipeline_name), {NativeLowering: cls.lowering, IRLegalization: _ArrayReleases}
         for one, why in whole.passes:
             if one not in _NEEDLESS[plain]:
-                passes.add_pass(cls.lowering if one is NativeLowering else one, why)
+                passes.add_pass(own.get(one, one), why)
         passes.finalize()
         return passes
 
