@@ -9,8 +9,8 @@ from ringsweep.numerics.functions import opposing, select
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import OnBelt
 from ringsweep.physics.forces import force_in, force_rate, largest_force
-from ringsweep.physics.friction.registry import SetValued, family
-from ringsweep.physics.friction.velocity import friction_at, stiction_band
+from ringsweep.physics.friction.registry import dead_band
+from ringsweep.physics.friction.velocity import friction_at
 
 
 @feature("no", of=ring.having(OnBelt, "force"), absorb=True)
@@ -25,13 +25,8 @@ def moving(scene, velocity, v, belt_velocity):
 
     Karnopp's sliding velocity is zero in the band, where `v` is the momentum by the mass.
     """
-    return _carried(family(scene.law), scene, velocity, v, belt_velocity)
-
-
-@feature("velocity", of=SetValued, absorb=True)
-def _carried(family, scene, velocity, v, belt_velocity):
     # The edge belongs to the band. Without a band the compiler sees that nothing is below 0.
-    return select(abs(v) < stiction_band(scene.law) * (1.0 + 1e-15), belt_velocity, velocity)
+    return select(abs(v) < dead_band(scene.law) * (1.0 + 1e-15), belt_velocity, velocity)
 
 
 @absorbed
@@ -54,19 +49,13 @@ def sliding(scene, x, velocity, v, forcing):
         Friction balances the other forces in a dead band, as far as it can.
     """
     mu, slope = friction_at(scene.law, abs(v), (scene.mu_s, scene.mu_k))
-    found, push = (opposing(mu, v), -slope, if_force(scene.body, scene.viscous, 0.0)), force_in(scene.drive, forcing)
-    K, slope, viscous = _in_dead_band(family(scene.law), scene, x, push, velocity, v, found)
-    return Slip((x, push - viscous * v, velocity), v, (K, K), (slope, slope), viscous / scene.body.mass, ())
-
-
-@feature("found", of=SetValued, absorb=True)
-def _in_dead_band(family, scene, x, push, velocity, v, found):
-    """K, its slope and the viscous coefficient, given as in slip, with those in a dead band."""
-    K, slope, viscous = found
-    held = abs(v) < stiction_band(scene.law)
+    push, viscous = force_in(scene.drive, forcing), if_force(scene.body, scene.viscous, 0.0)
+    held = abs(v) < dead_band(scene.law)
     load, _, friction = ring.held(scene.body, 1.0, (x, push, velocity), x * x * x, 0.0, 0.0)
     needed = max(-scene.mu_s, min(scene.mu_s, friction / (load + 1e-300)))
-    return select(held, needed, K), select(held, 0.0, slope), select(held, 0.0, viscous)
+    K, slope = select(held, needed, opposing(mu, v)), select(held, 0.0, -slope)
+    viscous = select(held, 0.0, viscous)
+    return Slip((x, push - viscous * v, velocity), v, (K, K), (slope, slope), viscous / scene.body.mass, ())
 
 
 @absorbed

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ringsweep.compile import hook, lacking
 from ringsweep.physics.friction import presliding
-from ringsweep.physics.friction.velocity import MU_K, MU_S, SCALE
+from ringsweep.physics.friction.velocity import MU_K, MU_S, SCALE, stiction_band
 from ringsweep.quantities.parameters import Parameter
 
 
@@ -69,6 +69,12 @@ def holds_in_band(law):
     return False
 
 
+@hook(absorb=True, optional=True)
+def dead_band(law):
+    """Sliding speed below which friction takes any value up to the breakaway force, m/s; 0 without a dead band."""
+    return 0.0
+
+
 def add_law(name: str, law: type, traits: Traits) -> None:
     """Register a friction law.
 
@@ -102,6 +108,7 @@ def describe(law: type, traits: Traits) -> None:
     family.implements(law)(lambda law: kind())
     if kind is SetValued:
         holds_in_band.implements(law)(lambda law: True)
+        dead_band.implements(law)(lambda law: stiction_band(law))
 
 
 def family_of(law: type) -> type:
