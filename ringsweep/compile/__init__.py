@@ -19,6 +19,7 @@ from ringsweep.compile.tuples import (
     map_leaves,
     put,
     replacing,
+    stub,
     take,
     unrolled,
 )
@@ -42,6 +43,7 @@ __all__ = [
     "readable_compile_errors",
     "replacing",
     "specialise",
+    "stub",
     "take",
     "unrolled",
 ]

@@ -22,7 +22,7 @@ def function_from_lines(names: str, lines: list[str], scope: dict[str, Any]) -> 
     return scope["body"]
 
 
-def _stub(function: Callable[..., Any], names: list[str], call: Callable[..., Any]) -> Any:
+def stub(function: Callable[..., Any], names: list[str], call: Callable[..., Any]) -> Any:
     """Function that passes its arguments, `names`, to `call`; with name and docstring of `function`."""
 
     def found(*arguments: Any) -> Any:
@@ -47,7 +47,7 @@ def unrolled(write: Callable[..., Any]) -> Any:
     def body(first: Any) -> Any:
         return function_from_lines(", ".join(names), write(len(first), *names), write.__globals__)
 
-    found = _stub(write, names, lambda *arguments: body(arguments[0])(*arguments))
+    found = stub(write, names, lambda *arguments: body(arguments[0])(*arguments))
     specialise(found, lambda *kinds: body(kinds[0]))
     return found
 
@@ -70,7 +70,7 @@ def generated(write: Callable[..., Any]) -> Any:
         made = write(*kinds)
         return function_from_lines(", ".join(names), *made) if isinstance(made, tuple) else made
 
-    found = _stub(write, names, refuse)
+    found = stub(write, names, refuse)
     specialise(found, body)
     return found
 
@@ -107,7 +107,7 @@ def feature(otherwise: str, *, of: type | Collection[type] = (), absorb: bool = 
         def typed(*kinds: Any) -> Any:
             return chosen(tuple if kinds[0] == types.Tuple(()) else getattr(kinds[0], "instance_class", None))
 
-        found = _stub(body, names, lambda *arguments: chosen(type(arguments[0]))(*arguments))
+        found = stub(body, names, lambda *arguments: chosen(type(arguments[0]))(*arguments))
         specialise(found, typed, absorb=absorb)
         return found
 

@@ -483,6 +483,9 @@ def force_period(drive):
     return period(drive)
 
 
+# The time 0, of the kind that kernels have: so functions of it are compiled for one kind only.
+_START = clock.Instant(0.0, 0.0)
+
 # Velocities that differ by less than this share of their size are equal but for rounding.
 _ROUNDING = 1e-15
 
@@ -502,7 +505,7 @@ def relative_velocity(drive, velocity):
     float
         Relative velocity, in the units of :func:`turn`.
     """
-    difference = velocity - turn(drive, 0.0)[1]
+    difference = velocity - turn(drive, _START)[1]
     return 0.0 if abs(difference) < _ROUNDING * (abs(velocity) + top_speed(drive)) else difference
 
 
@@ -524,10 +527,10 @@ def velocity_at_beginning(drive, velocity):
     float
         Relative velocity at the time :func:`beginning`, in the units of :func:`turn`.
     """
-    before, acceleration = turn(drive, 0.0)[1:3]
+    before, acceleration = turn(drive, _START)[1:3]
     if velocity == 0.0 and abs(acceleration) < inf:
         return 0.0
-    return velocity - (turn(drive, beginning(drive))[1] - before)
+    return velocity - (turn(drive, clock.Instant(beginning(drive), 0.0))[1] - before)
 
 
 #: Functions without a default that methods with a constant step need of a drive, and those that the other methods need.

@@ -18,7 +18,7 @@ from functools import cache
 from math import inf, nan, sqrt
 from typing import Any
 
-from ringsweep.compile import function_from_lines, inlined, specialise
+from ringsweep.compile import function_from_lines, inlined, specialise, stub
 from ringsweep.numerics import writer
 from ringsweep.numerics.expressions import Node, derivative, substitute, symbol
 from ringsweep.numerics.functions import (
@@ -200,11 +200,9 @@ def _derived(write: Callable[..., list[str]]) -> Any:
         in_lanes = LANES in kinds
         return body(getattr(kinds[0], "instance_class", None), count_of(kinds), in_lanes)
 
-    function.__name__, function.__doc__, function.__module__ = write.__name__, write.__doc__, write.__module__
-    parameters = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
-    function.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    specialise(function, typed, absorb=True)
-    return function
+    found = stub(write, names, function)
+    specialise(found, typed, absorb=True)
+    return found
 
 
 # ---- regions ----------------------------------------------------------------------------------
