@@ -22,7 +22,6 @@ from ringsweep.numerics.functions import (
     select,
     sine_cosine,
     sine_cosine_carried,
-    sine_cosine_near,
 )
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import conform, read_lanes, side_by_side, write
@@ -44,7 +43,7 @@ def _functions(x, near, out):
     sine, cosine = sine_cosine(a)
     far = select(a > b, a, -b)
     write(out, 0, WIDTH, (sine, cosine, decay(abs(a)), floor(a), opposing(abs(a), b), far, min(a, b), max(a, b)))
-    write(out, 8 * WIDTH, WIDTH, sine_cosine_near(b, a, sine, cosine))
+    write(out, 8 * WIDTH, WIDTH, sine_cosine_carried(b, a, sine, cosine, False))
     return any_of(a > 1e5)
 
 

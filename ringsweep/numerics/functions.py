@@ -374,19 +374,11 @@ def _lanes_sine_cosine(x):
     return _select(_bit(shifted, 1), -a, a), _select(_bit(shifted + 1.0, 1), -b, b)
 
 
-def sine_cosine_near(x, x_0, sine, cosine):
-    """Sine and cosine of `x`, given `sine` and `cosine` of a number `x_0` that is probably close to `x`."""
-    return math.sin(x), math.cos(x)
-
-
-lanes_body(sine_cosine_near)(lambda x, x_0, sine, cosine: sine_cosine_carried(x, x_0, sine, cosine, False))
-
-
 def sine_cosine_carried(x, x_0, sine, cosine, afresh):
-    """:func:`sine_cosine_near` for a series of numbers, each with the results for the one before.
+    """Sine and cosine of `x`, given `sine` and `cosine` of a number `x_0` that is probably close to `x`.
 
-    Rounding errors add up: to 2e-15 at most over 64 numbers. So `afresh`, a bool, is to be true now and then. Then the
-    results do not depend on `x_0`.
+    In a series of numbers, each with the results for the one before, rounding errors add up: to 2e-15 at most over 64
+    numbers. So `afresh`, a bool, is to be true now and then. Then the results do not depend on `x_0`.
     """
     return math.sin(x), math.cos(x)
 

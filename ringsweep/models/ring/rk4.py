@@ -6,7 +6,7 @@ from ringsweep.models.inspection import inspection, rates, slip_in_space, word_o
 from ringsweep.models.interface import constant_step
 from ringsweep.models.ring.contacts import places_at, zones_of
 from ringsweep.models.slip import Slip
-from ringsweep.numerics.functions import opposing, sine_cosine, sine_cosine_carried, sine_cosine_near
+from ringsweep.numerics.functions import opposing, sine_cosine, sine_cosine_carried
 from ringsweep.physics import zones
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.ring import BristleRing, Ring, coefficients_at
@@ -26,7 +26,7 @@ def _slip_in_space(scene, y, v, forcing, angle):
 
 @constant_step.rates.implements(Ring, BristleRing)
 def _rates(scene, now, y, forcing):
-    return rates(scene, y, forcing, sine_cosine_near(y[0], now.place, now.motion[0], now.motion[1]))
+    return rates(scene, y, forcing, sine_cosine_carried(y[0], now.place, now.motion[0], now.motion[1], False))
 
 
 @constant_step.inspect.implements(Ring, BristleRing)
