@@ -224,7 +224,7 @@ def test_examples_do_what_the_page_claims(tmp_path):
 
 #: Changes that make an example incomplete, and what is said of each.
 INCOMPLETE = [
-    ("my_dahl.py", "@stick_speed.implements(Ductile)", "", "friction law dahl-ductile has no presliding.stick_speed"),
+    ("my_dahl.py", "@region_guard.implements(Ductile)", "", "friction law dahl-ductile has no presliding.region_guard"),
     ("my_run_up.py", "@jerk.implements(RunUp)", "", "drive run-up has no drives.jerk"),
     ("my_disc.py", "@ring.body(", "_ = dict(", "model disc: body_type OnDisc is not declared by ring.body"),
     ("my_disc.py", "K1*N1 - ", "K1*N2 - ", "N2 is not known"),

@@ -508,10 +508,8 @@ OWN = """
 from typing import Annotated, NamedTuple
 from ringsweep.quantities.parameters import Leaf
 from ringsweep.physics.friction import Dynamic, Traits, add_law
-from ringsweep.physics.friction.bristles import _dahl_bristle, _dahl_region_guard, _same_deflection, _undeflected
-from ringsweep.physics.friction.presliding import (
-    SIGMA_0, after_yield, bristle, initial_deflection, region_guard, stick_speed
-)
+from ringsweep.physics.friction.bristles import _dahl_bristle, _dahl_region_guard
+from ringsweep.physics.friction.presliding import SIGMA_0, bristle, region_guard
 
 
 class Brush(NamedTuple):
@@ -520,14 +518,6 @@ class Brush(NamedTuple):
 
 bristle.implements(Brush)(_dahl_bristle)
 region_guard.implements(Brush)(_dahl_region_guard)
-after_yield.implements(Brush)(_same_deflection)
-initial_deflection.implements(Brush)(_undeflected)
-
-
-@stick_speed.implements(Brush)
-def _stick_speed(law, recoil):
-    return recoil
-
 
 add_law("brush", Brush, Traits(Dynamic, coefficients=("mu_k",)))
 """

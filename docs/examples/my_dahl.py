@@ -6,14 +6,11 @@ from ringsweep.physics.friction import Dynamic, Traits, add_law
 from ringsweep.physics.friction.presliding import (
     NEARLY,
     SIGMA_0,
-    after_yield,
     bristle,
-    initial_deflection,
     region_guard,
     steady_deflection,
-    stick_speed,
 )
-from ringsweep.physics.friction.velocity import BAND, KINETIC
+from ringsweep.physics.friction.velocity import BAND
 from ringsweep.quantities.parameters import Leaf
 
 
@@ -34,21 +31,6 @@ def _bristle(law, mu_s, mu_k, v, z, sign, region):
 def _region_guard(law, mu_s, mu_k, v, z, sign, region):
     slack = NEARLY - law.sigma0 / mu_k * sign * z
     return slack if region == BAND else -slack
-
-
-@after_yield.implements(Ductile)
-def _after_yield(law, mu_s, mu_k, z, sign, region):
-    return z, KINETIC if region == BAND else BAND
-
-
-@stick_speed.implements(Ductile)
-def _stick_speed(law, recoil):
-    return recoil
-
-
-@initial_deflection.implements(Ductile)
-def _initial_deflection(law, mu_s, mu_k):
-    return 0.0
 
 
 @steady_deflection.implements(Ductile)

@@ -134,7 +134,8 @@ def _goes_on(scene, run, guard, record):
 
 @_step.implements(Smooth)
 def _step_either(family, scene, run, h_max, tolerances, scratch):
-    if implicit.may_creep(scene, run.mode):
+    # A mode relaxes fast in the stiction band alone.
+    if run.mode.region < 0:
         is_stiff, guard, s, y, record, control, error = _creep(scene, run, h_max, tolerances[1], scratch)
         if is_stiff:
             record = _goes_on(scene, run, guard, record)
@@ -186,20 +187,26 @@ def _begin_series(family, scene, mode, now, y, tolerances, c):
 
 @_begin.implements(Dynamic)
 def _begin_implicit(family, scene, mode, now, y, tolerances, c):
-    forcing = drives.turn(scene.drive, now)
+    return recorder.begin(scene, now.t, _seen_in(scene, mode, drives.turn(scene.drive, now), y))
+
+
+@inlined
+def _seen_in(scene, mode, forcing, y):
+    """What the recorder is shown of a state, by the equations of implicit steps."""
     x = implicit.to_implicit(scene, forcing, y)
-    view = implicit.guards_and_motion(scene, mode, implicit.common(scene, mode, forcing, x), forcing, x)
-    return recorder.begin(scene, now.t, implicit.seen(scene, view))
+    common = implicit.common(scene, mode, forcing, x)
+    return implicit.seen(scene, implicit.guards_and_motion(scene, mode, common, forcing, x))
 
 
 def _row_of_series(family, scene, step, c, s, y):
     """Row of a time history, the time `s` after the beginning of a step, where the state is `y`."""
-    return series.row(scene, step.mode, c, later(step.now, s), s)
+    forcing, seen = drives.turn(scene.drive, later(step.now, s)), series.seen_at(scene, step.mode, c, s, s)
+    return modes.row(scene, step.mode, forcing, series.state_at(scene, c, s), seen)
 
 
 def _row_of_state(family, scene, step, c, s, y):
     forcing = drives.turn(scene.drive, later(step.now, s))
-    return implicit.row(scene, step.mode, forcing, implicit.to_implicit(scene, forcing, y))
+    return modes.row(scene, step.mode, forcing, y, _seen_in(scene, step.mode, forcing, y))
 
 
 _history_row = either(_row_of_series, _row_of_state)

@@ -13,8 +13,10 @@ from ringsweep.numerics.clock import Instant, later
 from ringsweep.numerics.series import ORDER, ascending, crossings, differentiate
 from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
-from ringsweep.solvers.steps import INSTANTS
 from ringsweep.solvers.variation import along_implicit, enter_implicit
+
+# Parts into which a step is divided to look for roots of the guards, and for extremes.
+INSTANTS = 4
 
 # Matrix that turns the values at the ends of these parts into the coefficients of a polynomial.
 _INTERPOLATION = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1.0, INSTANTS + 1), increasing=True)))
@@ -187,18 +189,16 @@ def _first_event(scene, start, scratch, taken, views):
 
     `views` are those at the beginning, in the middle and at the end of the step.
     """
-    (before, within, after), samples, s = views, scratch.samples, taken.h
+    (before, within, after), s = views, taken.h
     near_zero = implicit.near_zero(scene, within[1])
-    for i in range(1, INSTANTS, 2):
-        guards = _view_within(scene, start, scratch, taken, i / INSTANTS)[0]
-        for g in range(len(near_zero)):
-            samples[g, i] = guards[g]
+    early = _view_within(scene, start, scratch, taken, 0.25)
+    late = _view_within(scene, start, scratch, taken, 0.75)
     event, h_event = -1, s
     for g in range(len(near_zero)):
-        samples[g, 0], samples[g, 2], samples[g, 4] = before[0][g], within[0][g], after[0][g]
         if not _may_vanish(near_zero[g], before[0][g], within[0][g], after[0][g]):
             continue
-        h_below = min(h_event, s * _fraction_below_zero(samples[g], scratch.work))
+        samples = before[0][g], early[0][g], within[0][g], late[0][g], after[0][g]
+        h_below = min(h_event, s * _fraction_below_zero(samples, scratch.work))
         if h_below == 0.0:
             continue
         value_below = _guard_after(scene, start, scratch, h_below, g)

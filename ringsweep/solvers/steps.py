@@ -18,9 +18,8 @@ from ringsweep.physics.friction import Dynamic, SetValued, Smooth
 #: The second run of a certificate has a tolerance that is looser by this factor.
 FACTOR = 30.0
 
-# Parts into which an implicit step is divided to look for roots of the guards, and largest numbers of guards and of
-# components of a state.
-INSTANTS, MOST_GUARDS, MOST_COMPONENTS = 4, 6, 8
+# Largest number of components of a state.
+MOST_COMPONENTS = 8
 
 
 def either(of_series: Callable[..., Any], of_implicit: Callable[..., Any]) -> Any:
@@ -51,8 +50,6 @@ class Scratch(NamedTuple):
         Series of the drive, see :func:`ringsweep.physics.drives.follow`.
     bends : ndarray of shape ``(2, 3, MOST_COMPONENTS)``
         ``bends[0]`` holds what :func:`ringsweep.solvers.rosenbrock.dense` needs of the last implicit step.
-    samples : ndarray of shape ``(MOST_GUARDS, INSTANTS + 1)``
-        Guards at instants of an implicit step.
     first_guard : int
         Row of the first guard in the table of series.
     """
@@ -61,7 +58,6 @@ class Scratch(NamedTuple):
     work: Any
     course: Any
     bends: Any
-    samples: Any
     first_guard: int
 
 
@@ -92,8 +88,8 @@ class Step(NamedTuple):
 @inlined
 def lent(scratch):
     """Scratch whose arrays are not counted; see :func:`ringsweep.compile.borrowed`."""
-    c, work, course, bends, samples, first_guard = scratch
-    return Scratch(borrowed(c), borrowed(work), borrowed(course), borrowed(bends), borrowed(samples), first_guard)
+    c, work, course, bends, first_guard = scratch
+    return Scratch(borrowed(c), borrowed(work), borrowed(course), borrowed(bends), first_guard)
 
 
 def scratch_for(rows: int, first_guard: int) -> Scratch:
@@ -105,7 +101,6 @@ def scratch_for(rows: int, first_guard: int) -> Scratch:
         np.empty(drives.COURSE_SHAPE),
         # A component that no step has changed must not be read as if one had.
         np.zeros((2, 3, MOST_COMPONENTS)),
-        np.empty((MOST_GUARDS, INSTANTS + 1)),
         first_guard,
     )
 

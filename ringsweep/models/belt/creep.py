@@ -6,7 +6,7 @@ from math import inf, nan
 
 from ringsweep.compile import inlined, unrolled
 from ringsweep.models.belt.force import if_force, length_scale, located
-from ringsweep.models.interface import implicit
+from ringsweep.models.interface import implicit, modes
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.forces import force_in
@@ -81,8 +81,7 @@ def _near_zero(scene, motion):
     return all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0)
 
 
-@implicit.row.implements(belt.Belt, belt.BristleBelt)
-def _row(scene, mode, forcing, x):
-    _, motion = implicit.guards_and_motion(scene, mode, (), forcing, x)
-    state = 0.0 if mode.region < 0 else float(mode.sign)
-    return motion[0], motion[1], motion[3], deflection(x, 0.0), state
+@modes.row.implements(belt.Belt, belt.BristleBelt)
+def _row(scene, mode, forcing, y, seen):
+    x, velocity, friction = seen[:3]
+    return x, velocity, friction, deflection(y, 0.0), 0.0 if mode.region < 0 else float(mode.sign)

@@ -339,9 +339,3 @@ def _extremes(scene, record, mode, c, h, work):
             work[0][count] = rest
             count += 1
     return count
-
-
-@series.row.implements(belt.Belt)
-def _row(scene, mode, c, t, s):
-    mode_now = 0.0 if mode.region < 0 else float(mode.sign)
-    return value(c[X], s), value(c[VELOCITY], s), value(c[FORCE], s), 0.0, mode_now

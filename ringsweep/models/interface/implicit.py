@@ -17,23 +17,6 @@ from ringsweep.physics import drives
 IMPLICIT_TOLERANCE = 1e3
 
 
-@hook(optional=True)
-def may_creep(scene, mode):
-    """Whether a mode may need implicit steps; if so, :func:`is_stiff` decides at each step.
-
-    Parameters
-    ----------
-    scene, mode : NamedTuple
-        One cell, and its mode.
-
-    Returns
-    -------
-    bool
-        By default true in the stiction band of a smooth law.
-    """
-    return mode.region < 0
-
-
 @hook
 def is_stiff(scene, mode, y, linear):
     """Whether a mode relaxes so fast, compared with its own motion, that an implicit step is better than a series.
@@ -225,9 +208,9 @@ def guards_and_motion(scene, mode, common, forcing, x):
     Returns
     -------
     tuple
-        ``(guards, motion)``. ``guards`` are at most six floats, positive while the mode holds. If the model has series,
+        ``(guards, motion)``. ``guards`` are floats, positive while the mode holds. If the model has series,
         they are in the order of the guards' rows. ``motion`` begins with place, velocity and acceleration of the body
-        in space; then comes whatever else :func:`seen`, :func:`near_zero` and :func:`row` need.
+        in space; then comes whatever else :func:`seen` and :func:`near_zero` need.
     """
 
 
@@ -285,25 +268,5 @@ def sought(scene, record, view):
     """
 
 
-@hook
-def row(scene, mode, forcing, x):
-    """Row of a time history.
-
-    Parameters
-    ----------
-    scene, mode : NamedTuple
-        One cell, and its mode.
-    forcing : tuple of float
-        Forcing at the time of the state.
-    x : tuple of float
-        State of an implicit step.
-
-    Returns
-    -------
-    tuple of float
-        One number for each history variable, in the order of ``Model.history``.
-    """
-
-
 #: Functions without a default, but for :func:`is_stiff`, which only smooth laws need.
-MEMBERS = (rates, linearise, error_scales, guards_and_motion, near_zero, seen, sought, row)
+MEMBERS = (rates, linearise, error_scales, guards_and_motion, near_zero, seen, sought)

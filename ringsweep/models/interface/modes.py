@@ -157,5 +157,27 @@ def in_space(scene, t, y):
     """
 
 
+@hook
+def row(scene, mode, forcing, y, seen):
+    """Row of a time history.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    forcing : tuple of float
+        What :func:`ringsweep.physics.drives.turn` returned.
+    y : tuple of float
+        State.
+    seen : tuple of float
+        The state as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
+
+    Returns
+    -------
+    tuple of float
+        One number for each history variable, in the order of ``Model.history``.
+    """
+
+
 #: Functions without a default.
-MEMBERS = (begin, switch, in_space)
+MEMBERS = (begin, switch, in_space, row)

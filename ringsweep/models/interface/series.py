@@ -142,7 +142,7 @@ def extremes(scene, record, mode, c, h, work):
     scene, record, mode : NamedTuple
         One cell, its record and its mode.
     c : ndarray of shape ``(rows, columns)``
-        Table of the step. Rows that neither :func:`state_at`, :func:`rates_at`, :func:`seen_at`, :func:`row` nor the
+        Table of the step. Rows that neither :func:`state_at`, :func:`rates_at`, :func:`seen_at` nor the
         guards need may be overwritten.
     h : float
         Length of the step, s.
@@ -157,27 +157,5 @@ def extremes(scene, record, mode, c, h, work):
     """
 
 
-@hook
-def row(scene, mode, c, t, s):
-    """Row of a time history.
-
-    Parameters
-    ----------
-    scene, mode : NamedTuple
-        One cell, and its mode.
-    c : ndarray of shape ``(rows, columns)``
-        Table of the step.
-    t : Instant
-        Time of the row, s.
-    s : float
-        Time since the beginning of the step, s.
-
-    Returns
-    -------
-    tuple of float
-        One number for each history variable, in the order of ``Model.history``.
-    """
-
-
 #: Functions without a default.
-MEMBERS = (expand, state_at, rates_at, seen_at_start, seen_at, extremes, row)
+MEMBERS = (expand, state_at, rates_at, seen_at_start, seen_at, extremes)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
 from ringsweep.models.interface.shock import Located
-from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zones_of
+from ringsweep.models.ring.contacts import coefficients_under, edges_ahead
 from ringsweep.models.ring.record import sought
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.numerics.functions import ROTATED, rotated, sine_cosine_from
@@ -114,13 +114,3 @@ def _seen(scene, view):
 def _sought(scene, record, view):
     guards, motion = view
     return sought(record, motion[0], motion[1], guards[NORMAL_1], guards[NORMAL_2])
-
-
-@implicit.row.implements(ring.Ring, ring.BristleRing)
-def _row(scene, mode, forcing, x):
-    common = implicit.common(scene, mode, forcing, x)
-    guards, motion = implicit.guards_and_motion(scene, mode, common, forcing, x)
-    phi, omega, epsilon, ring_omega = motion[:4]
-    zones = zones_of(scene, mode.place_1, mode.place_2)
-    normals, state = (guards[NORMAL_1], guards[NORMAL_2]), 0.0 if mode.region < 0 else float(mode.sign)
-    return joined((phi, omega, epsilon, *normals, ring_omega, *zones, state), motion[4:])

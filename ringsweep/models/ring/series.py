@@ -632,17 +632,8 @@ def _extremes(scene, record, mode, c, h, work):
     return count
 
 
-@series.row.implements(ring.Ring)
-def _row(scene, mode, c, t, s):
-    zone_1, zone_2 = zones_of(scene, mode.place_1, mode.place_2)
-    return (
-        value(c[PHI], s),
-        value(c[OMEGA], s),
-        value(c[EPSILON], s),
-        value(c[NORMAL_1], s),
-        value(c[NORMAL_2], s),
-        drives.turn(scene.drive, t)[1],
-        zone_1,
-        zone_2,
-        0.0 if mode.region < 0 else float(mode.sign),
-    )
+@modes.row.implements(ring.Ring, ring.BristleRing)
+def _row(scene, mode, forcing, y, seen):
+    phi, omega, normal_1, normal_2, located = seen[:5]
+    places, state = zones_of(scene, mode.place_1, mode.place_2), 0.0 if mode.region < 0 else float(mode.sign)
+    return phi, omega, located.acceleration, normal_1, normal_2, forcing[1], *places, state, *y[2:]

@@ -179,11 +179,6 @@ def _stribeck_steady_deflection(law, mu_s, mu_k, v):
     return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * g / law.sigma0
 
 
-@after_yield.implements(Dahl, LuGre, ElastoPlastic)
-def _same_deflection(law, mu_s, mu_k, z, sign, region):
-    return z, KINETIC if region == BAND else BAND
-
-
 @stick_speed.implements(LuGre, ElastoPlastic)
 def _stribeck_stick_speed(law, recoil):
     return min(law.v_s, recoil)
@@ -217,11 +212,6 @@ def _reset_integrator_region_guard(law, mu_s, mu_k, v, z, sign, region):
 @after_yield.implements(ResetIntegrator)
 def _reset_integrator_after_yield(law, mu_s, mu_k, z, sign, region):
     return sign * mu_s / law.sigma0, KINETIC
-
-
-@initial_deflection.implements(Dahl, LuGre, ElastoPlastic, ResetIntegrator)
-def _undeflected(law, mu_s, mu_k):
-    return 0.0
 
 
 #: Number of bonds of a contact of :class:`Bristles`; its authors recommend 20 to 25.
@@ -310,11 +300,6 @@ def _bonds_initial_deflection(law, mu_s, mu_k):
     for i in range(BONDS):
         law.bonds[i] -= mean
     return 0.0
-
-
-@stick_speed.implements(Dahl, ResetIntegrator, Bristles)
-def _recoil_stick_speed(law, recoil):
-    return recoil
 
 
 _DAHL = "P. R. Dahl, AIAA Journal 14, 1675-1682 (1976), doi:10.2514/3.61511"

@@ -7,6 +7,7 @@ Stiffness and damping are per unit of the normal load: 1/m and s/m. The traction
 from __future__ import annotations
 
 from ringsweep.compile import hook
+from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.quantities.parameters import Parameter
 
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0, open_lower=True)
@@ -68,7 +69,7 @@ def region_guard(law, mu_s, mu_k, v, z, sign, region):
     """
 
 
-@hook
+@hook(optional=True)
 def after_yield(law, mu_s, mu_k, z, sign, region):
     """Deflection and region after :func:`region_guard` has reached zero.
 
@@ -80,11 +81,12 @@ def after_yield(law, mu_s, mu_k, z, sign, region):
     Returns
     -------
     tuple
-        ``(z, region)``: deflection, m; and BAND or KINETIC.
+        ``(z, region)``: deflection, m; and BAND or KINETIC. By default the same deflection and the other region.
     """
+    return z, KINETIC if region == BAND else BAND
 
 
-@hook
+@hook(optional=True)
 def stick_speed(law, recoil):
     """Sliding speed below which a contact counts as stuck, m/s.
 
@@ -99,13 +101,14 @@ def stick_speed(law, recoil):
     Returns
     -------
     float
-        `recoil`, or a smaller characteristic speed of the law, m/s.
+        A characteristic speed of the law that is smaller than `recoil`, m/s; by default `recoil`.
     """
+    return recoil
 
 
-@hook
+@hook(optional=True)
 def initial_deflection(law, mu_s, mu_k):
-    """Deflection at the launch, m. A law with memory of its own sets it here.
+    """Deflection at the launch, m; by default 0. A law with memory of its own sets it here.
 
     Parameters
     ----------
@@ -113,6 +116,7 @@ def initial_deflection(law, mu_s, mu_k):
     mu_s, mu_k : float
         As for :func:`bristle`.
     """
+    return 0.0
 
 
 @hook
@@ -132,4 +136,4 @@ def steady_deflection(law, mu_s, mu_k, v):
 
 
 #: Functions that every law with bristles must have.
-MEMBERS = (bristle, region_guard, after_yield, stick_speed, initial_deflection)
+MEMBERS = (bristle, region_guard)

@@ -21,7 +21,6 @@ from ringsweep.models.ring.impact.mode import (
     place_of,
     ring_of,
 )
-from ringsweep.models.ring.impact.rows import row_of
 from ringsweep.models.ring.record import sought
 from ringsweep.models.sliding import rate_at_rest
 from ringsweep.numerics.terms import joined
@@ -178,11 +177,3 @@ def _sought(scene, record, view):
     psi, psi_dot, normal_1, normal_2, _, gap_1, gap_2, _ = view[1][0]
     most = record.gap_max
     return (*sought(record.base, psi, psi_dot, normal_1, normal_2), (gap_1, 0.0, most), (gap_2, 0.0, most))
-
-
-@implicit.row.implements(ImpactRing)
-def _row(scene, mode, forcing, x):
-    common = implicit.common(scene, mode, forcing, x)
-    view = implicit.guards_and_motion(scene, mode, common, forcing, x)
-    y = implicit.from_implicit(scene, forcing, x)
-    return row_of(scene, mode, forcing, y, implicit.seen(scene, view))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from ringsweep.compile import inlined
-from ringsweep.models.interface import series
+from ringsweep.models.interface import modes
 from ringsweep.models.ring.impact.mode import BOTH
 from ringsweep.models.ring.impact.switch import motion_of
-from ringsweep.physics import drives, ring
+from ringsweep.physics import ring
 from ringsweep.physics.impact import ImpactRing, contact_of
 from ringsweep.physics.zones import coefficients, locate
 
@@ -19,9 +18,8 @@ HISTORY = (
 EVENT = ("number", "time", "event", "contact", "speed", "impulse")
 
 
-@inlined
-def row_of(scene, mode, forcing, y, seen):
-    """Row of the state `y`, of which the recorder is shown `seen`."""
+@modes.row.implements(ImpactRing)
+def _row(scene, mode, forcing, y, seen):
     psi, rate, normal_1, normal_2, located = seen[0], seen[1], seen[2], seen[3], seen[4]
     contacts, (theta, ring_omega, _) = mode.contacts, forcing
     event = contacts.event
@@ -55,9 +53,3 @@ def row_of(scene, mode, forcing, y, seen):
         event.speed,
         event.impulse,
     )
-
-
-@series.row.implements(ImpactRing)
-def _row(scene, mode, c, t, s):
-    forcing = drives.turn(scene.drive, t)
-    return row_of(scene, mode, forcing, series.state_at(scene, c, s), series.seen_at(scene, mode, c, s, s))
