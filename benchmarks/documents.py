@@ -23,6 +23,7 @@ _FIGURE = re.compile(r"(<!-- (\w+)\.(\w+) -->)(.*?)(<!-- / -->)", re.DOTALL)
 def documents() -> Iterator[Path]:
     """Documents that may have figures."""
     yield ROOT / "README.md"
+    yield ROOT / "CHANGELOG.md"
     yield from sorted((ROOT / "docs").glob("*.md"))
 
 
