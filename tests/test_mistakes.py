@@ -219,7 +219,7 @@ FITS: list[tuple[Any, Any, dict[str, Any], str]] = [
     (GOOD, "friction.mu_k", {"start": "many"}, "start: 'many' is not a number"),
     ("gap.csv", "friction.mu_k", {}, "gap.csv, line 3: data.x.1: 'nan' is not finite"),
     ("angle.csv", "friction.mu_k", {}, "angle.csv, line 1: data.phi: 'phi' is no quantity of the history"),
-    ("mass.csv", "friction.mu_k", {}, "mass.csv, line 2: data.x.0: '0.2 kg' has the wrong unit"),
+    ("mass.csv", "friction.mu_k", {}, "mass.csv, line 1: data.x: the unit 'kg' does not fit"),
     ("empty.csv", "friction.mu_k", {}, "the file is empty"),
 ]
 

@@ -4,7 +4,6 @@ from ringsweep.compile.cache import OWN_FILES
 from ringsweep.config.axes import Axes as Axes
 from ringsweep.config.configuration import Config as Config
 from ringsweep.config.configuration import Setting as Setting
-from ringsweep.config.configuration import as_written as as_written
 from ringsweep.config.configuration import load as load
 from ringsweep.config.configuration import tell_unit as tell_unit
 from ringsweep.config.configuration import with_values as with_values

@@ -293,17 +293,6 @@ def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parame
         )
 
 
-def as_written(config: Config, path: str) -> Any:
-    """A number as a configuration gives it, with its unit: in the scene, or else first on its axis; or None."""
-    node = written(config.source, path)
-    if node is None:
-        columns = columns_of(config.source.get("sweep", {}))
-        node = next((given for one, _, _, given in columns if one == path), None)
-    while node and isinstance(node, dict | list):
-        node = next(iter(node.values())) if isinstance(node, dict) else node[0]
-    return node
-
-
 def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
     """Put a value into the tree; its full path and what stood there. The path is checked later, with the tree."""
     told = f"--set {path}={value}", None

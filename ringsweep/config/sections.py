@@ -92,7 +92,7 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
         return np.array([quantity(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
     except InputError:
         # A column has its unit in its header.
-        if len(given) > 1 and (unit := common_unit(value for value in given if isinstance(value, str))):
+        if len(given) > 1 and (unit := common_unit(given)):
             check_unit(unit, parameter, where)
         raise
 

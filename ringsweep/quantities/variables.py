@@ -413,28 +413,32 @@ def written(configuration: Mapping[str, Any], path: str) -> Any:
     return node
 
 
+def written_values(configuration: Mapping[str, Any], path: str) -> list[Any]:
+    """Numbers as a configuration writes them: those of an axis if they have units, or else that in the scene."""
+    axes: dict[str, Any] = {}
+    for columns in ((configuration.get("sweep") or {}).get(key) or {} for key in ("points", "grid")):
+        axes |= {name.strip(): given for names, given in columns.items() for name in names.split(",")}
+    on_axis = _leaves(axes.get(path))
+    return on_axis if any(isinstance(value, str) for value in on_axis) else _leaves(written(configuration, path))
+
+
 def written_unit(configuration: Mapping[str, Any], path: str) -> str:
-    """The unit in which a configuration wrote an axis, or else the value in the scene; empty if it wrote plain numbers.
-
-    Different units along one axis count as none.
-    """
-    sweep = configuration.get("sweep") or {}
-    in_sweep = [found for key in ("grid", "points") if (found := _texts((sweep.get(key) or {}).get(path)))]
-    return common_unit(in_sweep[0] if in_sweep else _texts(written(configuration, path)))
+    """The unit in which a configuration writes a number; empty if it writes plain ones, or several units."""
+    return common_unit(written_values(configuration, path))
 
 
-def common_unit(texts: Iterable[str]) -> str:
-    """The unit that follows the number in all texts; empty if it is not one."""
+def common_unit(values: Iterable[Any]) -> str:
+    """The unit that follows the number in all texts among some values; empty if it is not one."""
+    texts = [value.strip() for value in values if isinstance(value, str)]
     units = {text[match.end() :].strip() for text in texts if (match := NUMBER.match(text))}
     return units.pop() if len(units) == 1 else ""
 
 
-def _texts(value: Any) -> list[str]:
-    """All texts in a value of a configuration."""
-    if isinstance(value, str):
-        return [value.strip()]
-    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
-    return [text for part in parts for text in _texts(part)]
+def _leaves(value: Any) -> list[Any]:
+    """All values within a value of a configuration."""
+    if not isinstance(value, Mapping | list):
+        return [value]
+    return [leaf for part in (value.values() if isinstance(value, Mapping) else value) for leaf in _leaves(part)]
 
 
 def in_unit(data: xr.DataArray, unit: str) -> xr.DataArray:

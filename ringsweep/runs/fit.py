@@ -236,7 +236,7 @@ def _ranges(config: Config, vary: Any) -> dict[str, tuple[float, float]]:
                 config, path, ends, ("--vary", f"{path}={{}}..HIGH"), ("--vary", f"{path}=LOW..{{}}")
             )
         except InputError as error:
-            form = f" ({path}=LOW..HIGH)" if path in known and (ends is None or len(ends) != 2) else ""
+            form = f" ({path}=LOW..HIGH)" if path in known and np.size(ends) != 2 else ""
             raise InputError(f"vary.{path}", error.problem + form) from None
     return found
 

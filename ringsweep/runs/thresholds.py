@@ -12,13 +12,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Config, as_named, as_written, load, sweepable, tell_unit, with_values, yaml_text
+from ringsweep.config import Config, as_named, load, sweepable, tell_unit, with_values, yaml_text
 from ringsweep.config.axes import Axes, dimension, sweep_section, swept_parameter, swept_paths
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import check_unit, quantity, show, spelled
-from ringsweep.quantities.variables import QUANTILE_ENDS, common_unit, in_unit, words, written_unit
+from ringsweep.quantities.variables import QUANTILE_ENDS, common_unit, in_unit, words, written_unit, written_values
 from ringsweep.runs.boundaries import bisect, check_word, located, run_points, word_in
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.sweep import compute
@@ -276,7 +276,7 @@ def interval(whole: Config, path: str, between: Any, *forms: tuple[str, str]) ->
             options = " and ".join(dict.fromkeys(option for option, _ in forms))
             raise InputError(where, f"the configuration does not sweep {path}: say where to look, by {options}")
         if isinstance(given, str):
-            tell_unit(*form, given, as_written(whole, path), parameter)
+            tell_unit(*form, given, written_values(whole.source, path)[0], parameter)
         ends.append(float(of_sweep(np.asarray(own))) if given is None else quantity(given, parameter, where))
     if not ends[0] < ends[1]:
         unit = after_number(parameter.unit)
