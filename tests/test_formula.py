@@ -247,9 +247,9 @@ REFUSED = [
     (formula("piecewise(v < w, mu_k, mu_s)", w=0.2), "...Write a steep ramp"),
     # A name that is taken, and wrong keys, of a law of the section laws.
     (named("lugre", {"mu": "mu_k", "at_rest": "mu_k"}), "...cannot be the name of a law"),
-    (named("mine", {"at_rest": "mu_k"}), "...a section with the key mu is expected"),
+    (named("mine", {"at_rest": "mu_k"}), "laws.mine.mu: missing: friction coefficient as a formula"),
     (named("mine", {"mu": "mu_k", "at_rst": "mu_k"}), "...did you mean `at_rest`?"),
-    (named("mine", "mu_k"), "...a section with the key mu is expected"),
+    (named("mine", "mu_k"), "...a section with keys is expected"),
 ]
 
 

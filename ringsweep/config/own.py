@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.sections import check_keys
+from ringsweep.config.sections import Key, Keys, read_keys
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
@@ -26,6 +26,12 @@ FORMULA = "formula"
 
 #: Name of the law that is a table of measured friction.
 TABLE_LAW = "table"
+
+#: Keys of a law by formula.
+LAW_KEYS: Keys = {
+    "mu": Key("friction coefficient as a formula of the sliding speed v", example=FRICTION.example),
+    "at_rest": Key("coefficient up to which friction holds at rest; without it the law is smooth"),
+}
 
 # Laws that a Python session has defined.
 _REGISTERED: dict[str, Definition] = {}
@@ -97,12 +103,10 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
         raise InputError(where, f"a section with a name and a formula of each law is expected, got {show(given)}")
     for name, section in given.items():
         path = f"{where}.{name}"
-        if not isinstance(section, Mapping) or "mu" not in section:
-            raise InputError(path, "a section with the key mu is expected, and at_rest for a law that holds at rest")
-        check_keys(section, ("mu", "at_rest"), path)
+        definition = Definition(**read_keys(section, LAW_KEYS, path))
         if not _may_name(name):
             raise InputError(path, f"{show(name)} cannot be the name of a law: choose another name")
-        found[name] = _law(Definition(section["mu"], section.get("at_rest")), path)
+        found[name] = _law(definition, path)
     # Beside another law a text may be the formula for a sweep over laws; a number is a misnamed coefficient.
     of_formula = friction.get("law", FORMULA) == FORMULA or isinstance(friction.get("mu"), str)
     if "mu" in friction and friction.get("law") != TABLE_LAW and of_formula:

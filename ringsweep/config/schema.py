@@ -11,7 +11,7 @@ from typing import Any
 
 from ringsweep.config.axes import COUNT
 from ringsweep.config.follow import KEYS as FOLLOW
-from ringsweep.config.own import FORMULA, TABLE_LAW
+from ringsweep.config.own import FORMULA, LAW_KEYS, TABLE_LAW
 from ringsweep.config.record import RECORD, SECTION
 from ringsweep.config.refine import KEYS as REFINE
 from ringsweep.config.scene import as_named
@@ -54,21 +54,21 @@ def schema() -> dict[str, Any]:
     for of, columns in TABLES.items():
         header = ", ".join(f"{name} ({p.unit})".removesuffix(" (1)") for name, p in columns.items())
         tables[f"{of}.file"] = _text(f"CSV file with columns {header.replace('time', 't')}")
-    law_by_formula = _section({"mu": _formula(), "at_rest": _at_rest()}, "mu")
+    by_formula = _keys(LAW_KEYS, mu=_TEXT, at_rest={"enum": [*COEFFICIENTS]})
     drives = _meanings(DRIVES) | {FORMULA: "A formula of the time, under theta"}
     scene = _nest(
         {
             "model": _word("what moves", _meanings(MODELS)),
             LAW: _laws("friction law; may be missing where sweep goes through laws"),
-            "friction.laws": _open("friction laws by formula: name -> mu, at_rest", law_by_formula),
-            "friction.at_rest": _at_rest(),
+            "friction.laws": _open("friction laws by formula: name -> mu, at_rest", _section(by_formula, "mu")),
+            "friction.at_rest": by_formula["at_rest"],
             "drive.law": _word("how the ring is driven", drives),
             "initial.from": _text("result file of the run on the belt that goes on"),
-            "force.formula": _formula("force on the body, N,", TIME),
+            "force.formula": _text("force on the body, N, as a formula of the time t, s"),
             **tables,
             **{f"{of}.interpolate": _word("what joins the rows of the table", w) for of, w in INTERPOLATIONS.items()},
-            "friction.mu": _any(_formula(), tables["friction.mu"]),
-            "drive.theta": _any(_formula("angle or displacement", TIME), tables["drive.theta"]),
+            "friction.mu": _any(by_formula["mu"], tables["friction.mu"]),
+            "drive.theta": _any(_text("angle or displacement as a formula of the time t, s"), tables["drive.theta"]),
             **leaves,
         }
     )
@@ -117,18 +117,6 @@ def _laws(about: str) -> dict[str, Any]:
 
 
 _VALUE, _TEXT, _FLAG = {"type": ["number", "string"]}, {"type": "string"}, {"type": "boolean"}
-
-# Variables of formulas.
-SPEED, TIME = "the sliding speed v", "the time t, s"
-
-
-def _formula(what: str = "friction coefficient", of: str = SPEED) -> dict[str, Any]:
-    return _text(f"{what} as a formula of {of}")
-
-
-def _at_rest() -> dict[str, Any]:
-    about = "coefficient up to which friction holds at rest; without it the law is smooth"
-    return {"description": about, "enum": [*COEFFICIENTS]}
 
 
 def _nest(leaves: Mapping[str, dict[str, Any]]) -> dict[str, Any]:

@@ -37,11 +37,11 @@ def suggestion(word: object, known: Iterable[str]) -> str:
     return (f"; did you mean `{near}`?" if near else "") + f" (known: {', '.join(names[:40])}{rest})"
 
 
-def check_keys(section: Iterable[Any], known: Iterable[str], path: str) -> None:
+def check_keys(section: Iterable[Any], known: Iterable[str], path: str, problem: str = "unknown key") -> None:
     """Refuse keys of a section that are not known; `path` is that of the section."""
     for key in section:
         if key not in known:
-            raise InputError(f"{path}.{key}", "unknown key" + suggestion(key, known))
+            raise InputError(f"{path}.{key}", problem + suggestion(key, known))
 
 
 def one_of(given: Any, known: Iterable[str], path: str, problem: str) -> str:

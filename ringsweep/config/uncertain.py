@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ringsweep.config.axes import Axes, paths_of, read_spacing, swept_parameter
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.scene import outcome_numbers, sweepable
-from ringsweep.config.sections import Key, Keys, one_of, read_keys, read_values, suggestion
+from ringsweep.config.sections import Key, Keys, check_keys, one_of, read_keys, read_values, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
@@ -270,9 +270,7 @@ def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping
         example = "such as `{uniform: 0.3 ± 10 %}`, or `{normal: [0.3, 10 %]}` if 10 % is a standard deviation"
         example += f", got {show(spec)} ({', '.join(kinds)})"
         raise InputError(where, f"a distribution is expected, {example}")
-    for key in spec:
-        if key not in (*kinds, "over"):
-            raise InputError(f"{where}.{key}", "is no distribution" + suggestion(key, kinds))
+    check_keys(spec, (*kinds, "over"), where, "is no distribution")
     named = [key for key in spec if key != "over"]
     if len(named) != 1:
         raise InputError(where, f"one distribution is expected, got {' and '.join(named) or 'none'}")
@@ -368,13 +366,9 @@ def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
     where = "sweep.sample.quantiles"
     if not isinstance(given, dict) or not given:
         raise InputError(where, f"variables with lists of levels are expected, got {show(given)}")
-    names = outcome_numbers(scene)
-    found = {}
-    for name, levels in given.items():
-        if name not in names:
-            raise InputError(f"{where}.{name}", "is no number of this model" + suggestion(name, names))
-        found[name] = tuple(sorted(set(read_values(levels, _LEVEL, f"{where}.{name}").tolist())))
-    return found
+    check_keys(given, outcome_numbers(scene), where, "is no number of this model")
+    levels = {name: read_values(levels, _LEVEL, f"{where}.{name}") for name, levels in given.items()}
+    return {name: tuple(np.unique(found).tolist()) for name, found in levels.items()}
 
 
 def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str, ...]]:
