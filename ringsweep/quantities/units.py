@@ -127,10 +127,9 @@ def _is_known(unit: str) -> bool:
     """Whether a unit is one that configurations may use."""
     try:
         _factor(unit, "1")
-    except ValueError:
-        return True
-    except LookupError:
-        return False
+    except (LookupError, ValueError) as error:
+        # It has another dimension.
+        return isinstance(error, ValueError)
     return True
 
 
@@ -231,14 +230,12 @@ def _factor_or_error(unit: str, value: str, parameter: Parameter, path: str) -> 
     try:
         return _factor(unit, parameter.unit)
     except _pint().PintError:
-        raise InputError(path, f"{parameter.long_name} is declared in {parameter.unit!r}, no known unit") from None
+        problem = f"{parameter.long_name} is declared in {parameter.unit!r}, no known unit"
     except LookupError:
-        raise InputError(
-            path, f"{show(value)}: {show(unit)} is not a known unit; {parameter.long_name} {target}"
-        ) from None
+        problem = f"{show(value)}: {show(unit)} is not a known unit; {parameter.long_name} {target}"
     except ValueError:
-        text = f"{show(value)} has the wrong unit: {parameter.long_name} {target}{_hint(unit, parameter.unit)}"
-        raise InputError(path, text) from None
+        problem = f"{show(value)} has the wrong unit: {parameter.long_name} {target}{_hint(unit, parameter.unit)}"
+    raise InputError(path, problem)
 
 
 #: What a unit of another dimension may have meant: unit that is wanted, one that was given, and the advice.
@@ -252,12 +249,9 @@ _MEANT = (
 def _hint(given: str, wanted: str) -> str:
     """End of the message about a unit of another dimension."""
     for target, source, advice in _MEANT:
-        if wanted == target:
-            try:
-                _factor(given, source)
-            except (LookupError, ValueError):
-                continue
-            return f": {advice}"
+        with contextlib.suppress(LookupError, ValueError):
+            if wanted == target and _factor(given, source):
+                return f": {advice}"
     return ""
 
 
