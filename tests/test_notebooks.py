@@ -1,4 +1,4 @@
-"""Every notebook runs from top to bottom on any machine, and gives the kinds of output that it stores."""
+"""Every notebook runs from top to bottom on any machine, and gives the outputs that it stores."""
 
 import os
 import re
@@ -11,47 +11,6 @@ from nbclient import NotebookClient
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-
-#: Grids of the notebooks, and smaller ones that the tests run in their place: text, and what replaces it.
-SMALLER = {
-    "01-first-map": {
-        "np.geomspace(1, 10, 64)": "np.geomspace(1, 10, 16)",
-        "np.linspace(0.5, 12, 64)": "np.linspace(0.5, 12, 16)",
-    },
-    "03-trust": {
-        "np.geomspace(0.1, 10, 32)": "np.geomspace(0.1, 10, 8)",
-        "np.linspace(2, 60, 32)": "np.linspace(2, 60, 8)",
-        "np.geomspace(1e-6, 1e-1, 101)": "np.geomspace(1e-6, 1e-1, 26)",
-        "target=1e-6, cells=16": "target=1e-3, cells=2",
-    },
-    "04-scratch": {
-        "np.linspace(0.9, 2.8, 58)": "np.linspace(0.9, 2.8, 20)",
-        "np.linspace(0.3, 3, 10)": "np.linspace(0.3, 3, 4)",
-        "np.linspace(0.5, 3, 51)": "np.linspace(0.5, 3, 11)",
-        "np.linspace(0, 6, 17)": "np.linspace(0, 6, 5)",
-    },
-    "05-your-own": {
-        "np.linspace(0, 350, 36)": "np.linspace(0, 350, 12)",
-        "np.linspace(0.5, 17.5, 18)": "np.linspace(0.5, 17.5, 6)",
-    },
-    "06-literature": {
-        "np.linspace(0.52, 3, 80)": "np.linspace(0.52, 3, 20)",
-        "np.linspace(0.01, 0.99, 60)": "np.linspace(0.01, 0.99, 12)",
-        "np.geomspace(0.035, 1.2, 110)": "np.geomspace(0.035, 1.2, 22)",
-        "np.linspace(0.02, 0.98, 65)": "np.linspace(0.02, 0.98, 13)",
-    },
-    "07-after-contact": {
-        "np.geomspace(0.1, 10, 32), np.radians(np.linspace(2, 60, 32))": (
-            "np.geomspace(0.1, 10, 8), np.radians(np.linspace(2, 60, 8))"
-        ),
-    },
-    "08-long-run": {
-        '"linspace": [0.15, 0.4, 60]': '"linspace": [0.15, 0.4, 8]',
-        "np.linspace(-1.95, 1.95, 40)": "np.linspace(-1.95, 1.95, 8)",
-        "np.linspace(0.025, 1.975, 40)": "np.linspace(0.025, 1.975, 8)",
-        "[1, 2, 4, 8]": "[1, 2]",
-    },
-}
 
 #: Text that depends on the machine or shows a problem: folders, progress bars, warnings, tracebacks.
 FOREIGN = re.compile(r"""(^|[\s'"(])(/\w+/|[A-Z]:\\)|site-packages|Warning\b|it/s\]|Traceback""", re.M)
@@ -74,6 +33,19 @@ def kinds(cell):
 KNOWN = ("exceed the limit of stability of rk4", "not settled")
 
 
+#: Run times, and steps of `rk4` across a band that they never meet, are those of the machine.
+OF_THE_MACHINE = re.compile("measured|printed step")
+
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+def numbers(cell):
+    """Numbers in the printed text and in the tables of a cell."""
+    plain = [output.get("text", "") if output.get("name") == "stdout" else "" for output in cell.outputs]
+    plain += [output.get("data", {}).get("text/plain", "") for output in cell.outputs]
+    return [float(number) for number in NUMBER.findall("\n".join(plain))]
+
+
 def code(notebook):
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
@@ -94,7 +66,7 @@ def test_folder_holds_notebooks():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
-def test_notebook_runs_and_gives_the_stored_kinds_of_output(path, tmp_path, monkeypatch):
+def test_notebook_runs_and_gives_the_stored_outputs(path, tmp_path, monkeypatch):
     kept = nbformat.read(path, as_version=4)
     nbformat.validate(kept)
     check(kept)
@@ -108,13 +80,13 @@ def test_notebook_runs_and_gives_the_stored_kinds_of_output(path, tmp_path, monk
     again = nbformat.from_dict(kept)
     for cell in code(again):
         cell.outputs, cell.execution_count = [], None
-    for text, smaller in SMALLER.get(path.stem, {}).items():
-        (cell,) = (cell for cell in code(again) if text in cell.source)
-        cell.source = cell.source.replace(text, smaller)
     where = {"metadata": {"path": str(tmp_path)}}
-    NotebookClient(again, timeout=170, kernel_name="python3", resources=where).execute()
+    NotebookClient(again, timeout=900, kernel_name="python3", resources=where).execute()
     check(again)
     for cell, before in zip(code(again), code(kept), strict=True):
         assert kinds(cell) == kinds(before), cell.source
+        if not OF_THE_MACHINE.search(cell.source):
+            # Digits that are rounding differ between processors.
+            assert numbers(cell) == pytest.approx(numbers(before), rel=0.02, abs=1e-3), cell.source
     left = [path.name for path in tmp_path.iterdir() if path.name not in ("ipython", "runtime")]
     assert not left, "the notebook left files behind"
