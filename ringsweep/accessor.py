@@ -131,8 +131,8 @@ class Accessor:
         return regime_map(self._ds, var=var, **options)
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Write one page with pictures, thresholds and certificates; see :func:`ringsweep.report.report`."""
-        from ringsweep.report import report
+        """Write one page with pictures, thresholds and certificates; see :func:`ringsweep.report.page.report`."""
+        from ringsweep.report.page import report
 
         report(self._ds, path)
 

@@ -19,7 +19,7 @@ from belts import on_belt, with_all_parts
 from jsonschema import Draft202012Validator
 
 import ringsweep
-from ringsweep.cli import main, report
+from ringsweep.cli import main
 from ringsweep.cli.parser import build_parser
 from ringsweep.config import load
 from ringsweep.config.schema import schema
@@ -29,6 +29,7 @@ from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.quantities.flags import FAILED, RIDING
 from ringsweep.quantities.variables import HISTORY, OUTCOMES
+from ringsweep.report import text as report
 from ringsweep.solvers import METHODS
 from ringsweep.storage import netcdf
 

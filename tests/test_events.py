@@ -5,7 +5,7 @@ import pytest
 from belts import on_belt
 
 import ringsweep
-from ringsweep.cli.report import events_in_words
+from ringsweep.report.text import events_in_words
 
 BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=20.0)
 

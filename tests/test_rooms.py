@@ -21,6 +21,7 @@ ROOMS = (
     "storage",
     "runs",
     "plots",
+    "report",
     "accessor",
     "cli",
 )

@@ -13,9 +13,9 @@ import xarray as xr
 import yaml
 
 import ringsweep
-from ringsweep.cli.report import in_lines
 from ringsweep.config import load
 from ringsweep.quantities.flags import FAILED, OSCILLATORY
+from ringsweep.report.text import in_lines
 from ringsweep.runs import cells
 from ringsweep.runs.warnings import warn_of_results
 from ringsweep.solvers.rk4 import RK4 as RK4Method

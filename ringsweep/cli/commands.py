@@ -77,7 +77,7 @@ def run_command(arguments: argparse.Namespace) -> int:
         print(describe(config, target, arguments.jobs, arguments.reuse))
         return 0
 
-    from ringsweep.cli.report import as_json, in_lines, status_of
+    from ringsweep.report.text import as_json, in_lines, status_of
     from ringsweep.runs.executors import Execution
     from ringsweep.runs.sweep import write
     from ringsweep.storage import netcdf
@@ -172,7 +172,7 @@ def report_command(arguments: argparse.Namespace) -> None:
     ringsweep report my.nc             my-report.html: map, thresholds, shocks, certificates, what to cite
     """
     from ringsweep.cli import drawing
-    from ringsweep.report import report
+    from ringsweep.report.page import report
 
     def write(_: argparse.Namespace, dataset: Path, result: Any) -> None:
         target = arguments.output or dataset.with_name(f"{dataset.stem}-report.html")
@@ -194,7 +194,7 @@ def simulate_command(arguments: argparse.Namespace) -> int:
     inputs = arguments.config, config.begins_from
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history", inputs)
 
-    from ringsweep.cli.report import events_in_words, status_of
+    from ringsweep.report.text import events_in_words, status_of
     from ringsweep.runs.simulate import history
 
     result = history(config)
@@ -229,8 +229,8 @@ def threshold_command(arguments: argparse.Namespace) -> None:
     ringsweep threshold my.yaml --path friction.rough.mu_k --regime separating --from 0.1 --to 0.5 --tolerance 1e-9
     ringsweep threshold my.yaml --path drive.amplitude --regime separating --unit rpm --json -o edge.nc
     """
-    from ringsweep.cli.report import as_json
     from ringsweep.config import load
+    from ringsweep.report.text import as_json
     from ringsweep.runs.thresholds import in_words, threshold
     from ringsweep.storage import netcdf
 
@@ -281,8 +281,8 @@ def animate_command(arguments: argparse.Namespace) -> int:
             "sweep", "several friction laws, but an animation shows one run: name its law by --set friction.law=..."
         )
 
-    from ringsweep.cli.report import status_of
     from ringsweep.plots.films import check_animation
+    from ringsweep.report.text import status_of
     from ringsweep.runs.simulate import history
 
     check_animation(target)
@@ -329,7 +329,7 @@ def info_command(arguments: argparse.Namespace) -> None:
             print(references(load(arguments.dataset), result.attrs["ringsweep_version"]))
             return
         if arguments.json:
-            from ringsweep.cli.report import as_json
+            from ringsweep.report.text import as_json
 
             print(as_json(result))
             return
@@ -387,7 +387,7 @@ def _print_summary(name: str, result: Any) -> None:
     elif "fit_report" in result.attrs:
         print(result.attrs["fit_report"])
     else:
-        from ringsweep.cli.report import in_lines
+        from ringsweep.report.text import in_lines
 
         print(in_lines(result))
     print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))

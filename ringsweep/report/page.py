@@ -15,13 +15,13 @@ import xarray as xr
 import yaml
 from matplotlib.figure import Figure
 
-from ringsweep.cli.report import summary
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, scene_text
 from ringsweep.plots.maps import regime_map
 from ringsweep.plots.probability import sensitivity_panel, survival_panel
 from ringsweep.plots.saving import suffix_of
 from ringsweep.quantities.variables import DEFINITIONS, configuration_of, swept, words, written
+from ringsweep.report.text import summary
 from ringsweep.storage.files import check_writable, replacing
 
 _HEAD = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>
