@@ -5,6 +5,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from belts import on_belt
+from relations import Kind, random_scenes
 from solutions import HISTORY, solve
 
 import ringsweep
@@ -298,6 +299,17 @@ class TestErrors:
         assert np.concatenate(covered).mean() > 0.99
         assert np.nanmedian(np.concatenate(of_motion)) < median
         assert np.nanmedian(np.concatenate(ratios)) < median_of_all
+
+    @pytest.mark.slow
+    def test_bounds_cover_errors_of_modes_that_last_for_one_step(self):
+        """Two runs take the same such step, so their difference does not show its error."""
+        kind = Kind("ring", "hyperbolic", "sinusoidal", arcs=1)
+        run = random_scenes(kind, 300, np.random.default_rng(101))
+        first, exact = run.outcomes(), run.outcomes(solver={"method": "event", "rtol": 1e-14})
+        certain = (first.certified == 1) & (exact.certified == 1)
+        for name in ("phi_end", "omega_end", "phi_min", "omega_min", "omega_max"):
+            bound = first[f"{name}_error"] + exact[f"{name}_error"]
+            assert float((abs(first[name] - exact[name]) / bound)[certain].max()) < 3.0
 
     @pytest.mark.slow
     def test_difference_that_is_small_by_chance_does_not_make_the_bound_small(self):

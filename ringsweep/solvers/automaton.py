@@ -66,7 +66,7 @@ def _after_creep(local, error):
 
 
 class Run(NamedTuple):
-    """A run between two steps."""
+    """A run between two steps; `has_switched` is whether its mode has just begun."""
 
     record: Any
     mode: Any
@@ -74,6 +74,7 @@ class Run(NamedTuple):
     y: Any
     control: StepControl
     local: LocalErrors
+    has_switched: bool
 
 
 @hook(absorb=True)
@@ -166,7 +167,7 @@ def _step_in_part(kind, scene, run, h_max, tolerances, scratch):
     if not simpler.is_simpler(scene, run.mode):
         return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
     part, record, y = simpler.part(scene, run.record, run.mode, run.y)
-    run_of_part = Run(record, run.mode, run.now, y, run.control, run.local)
+    run_of_part = Run(record, run.mode, run.now, y, run.control, run.local, run.has_switched)
     is_implicit, guard, s, y, record, control, local = _step(
         family(scene.law), part, run_of_part, h_max, tolerances, scratch
     )
@@ -367,7 +368,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             limit = min(scene.span, drives.next_knot(scene.drive, t))
             h_max = _until(limit, now)
             control = _with_length(control, min(control.h, spacing))
-            run = Run(record, mode, now, y, control, local)
+            run = Run(record, mode, now, y, control, local, just_switched)
             is_implicit, guard, s, y_next, record, control, local = _step_in(
                 simpler.kind(scene), scene, run, h_max, tolerances, scratch
             )
@@ -382,7 +383,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                         # Rounded otherwise, the end of a mode would not be the instant at which the next one begins.
                         at = s if part == parts else s * part / parts
                         count = _store_row(scene, step, c, at, state, history, count)
-                just_switched = guard >= 0 or (just_switched and s == 0.0)
+            just_switched = guard >= 0 or (just_switched and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
             now, status, mode, y = _after_step(scene, mode, guard, now, s, limit, y_next)

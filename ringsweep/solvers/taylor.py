@@ -50,14 +50,15 @@ def _first_event(c, first, entry_guard, h, work):
 
 
 @inlined
-def _shared(s, h, reach):
+def _shared(run, s, h, reach):
     """Error of a step, in units of the tolerance, if a run at a looser tolerance takes the same step; else 0.
 
     The length of the step is `s`, without an event `h`; the tolerance allows the length `reach`, s.
     """
     error = (s / reach) ** ORDER if s > 0.0 else 0.0
-    # The looser run needs no shorter step up to the event, or is limited to the same length.
-    return error if error * FACTOR < 1.0 or s == h < reach else 0.0
+    # The looser run needs no shorter step up to the event, or is limited to the same length. A mode that lasts for one
+    # step is one step of the looser run too.
+    return error if error * FACTOR < 1.0 or s == h < reach or (run.has_switched and s < h) else 0.0
 
 
 @inlined
@@ -107,4 +108,4 @@ def series_step(scene, run, h_max, tolerance, scratch):
     h = min(longest, h_max)
     guard, s = _first_event(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)
     record = _observe(scene, run, s, scratch) if s > 0.0 else run.record
-    return guard, s, series.state_at(scene, c, s), record, _shared(s, h, reach)
+    return guard, s, series.state_at(scene, c, s), record, _shared(run, s, h, reach)
