@@ -5,7 +5,9 @@ import os
 import shutil
 from pathlib import Path
 from types import FunctionType
+from typing import NamedTuple
 
+import numba
 import numpy as np
 import pytest
 from numba.core import caching
@@ -13,7 +15,7 @@ from numba.core.codegen import JITCPUCodegen
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
 import ringsweep
-from ringsweep.compile import cache, numba_private, readable_compile_errors
+from ringsweep.compile import cache, feature, numba_private, readable_compile_errors
 from ringsweep.compile.cache import IN_KERNELS, sources_digest
 from ringsweep.errors import InputError
 
@@ -29,6 +31,37 @@ def package(tmp_path):
 def edited(path):
     """Append a comment to a file."""
     path.write_text(path.read_text(encoding="utf-8") + "\n# An edit.\n", encoding="utf-8")
+
+
+class Spring(NamedTuple):
+    stiffness: float
+
+
+class Rope(NamedTuple):
+    length: float
+
+
+@feature("-x", of=Spring)
+def pull(part, x):
+    return -part.stiffness * x
+
+
+@feature("_WITHOUT", absorb=True)
+def pull_if_there(part, x):
+    return -part.stiffness * x
+
+
+_WITHOUT = 0.0
+
+
+@pytest.mark.parametrize(
+    ("call", "part", "expected"),
+    [(pull, Spring(3.0), -6.0), (pull, Rope(1.0), -2.0), (pull_if_there, Spring(3.0), -6.0), (pull_if_there, (), 0.0)],
+)
+def test_formula_of_a_feature_is_not_compiled_where_it_is_missing(call, part, expected):
+    """Neither a rope nor an empty tuple has a stiffness: a kernel with the formula would not compile."""
+    in_kernel = numba.njit(lambda part, x: call(part, x))
+    assert call(part, 2.0) == in_kernel(part, 2.0) == expected
 
 
 @pytest.mark.parametrize(
