@@ -97,8 +97,8 @@ def feature(otherwise: str, *, of: type | Collection[type] = (), absorb: bool = 
 
         @cache
         def without() -> Any:
-            # By now the module has all its names.
-            scope = {"inf": inf, "nan": nan} | body.__globals__
+            # By now the module has all its names. What stands for the absence of a feature is no part of it.
+            scope = body.__globals__ | {"inf": inf, "nan": nan, "__name__": __name__}
             return function_from_lines(", ".join(names), [f"return {otherwise}"], scope)
 
         def chosen(first: type | None) -> Any:
