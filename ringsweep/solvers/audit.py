@@ -50,13 +50,9 @@ def is_checked(n):
     return n <= _ALL_CHECKED or (n * 0.6180339887498949) % 1.0 < _CHECKED_SHARE
 
 
-def _ends_of_series(family, scene, step, scratch):
-    """Forcing and state at both ends of a step; in an implicit step the state for implicit steps."""
-    after = drives.turn(scene.drive, later(step.now, step.s))
-    return (drives.turn(scene.drive, step.now), step.y), (after, step.y_next)
-
-
-def _ends_of_implicit(family, scene, step, scratch):
+@inlined
+def _ends(scene, step, scratch):
+    """Forcing and state of an implicit step at both its ends."""
     before = implicit.forcing(scene, scratch.course, step.now, 0.0)
     after = implicit.forcing(scene, scratch.course, step.now, step.s)
     return (before, implicit.to_implicit(scene, before, step.y)), (
@@ -65,27 +61,36 @@ def _ends_of_implicit(family, scene, step, scratch):
     )
 
 
-def _state_in_series(family, scene, step, scratch, ends, fraction):
-    """Forcing, state and rates at a fraction of a step, from the dense output."""
+def _violation_in_series(family, scene, step, scratch, tolerance, fraction):
+    """Violation of the friction law and power of friction at a fraction of a step, from the dense output."""
     s = fraction * step.s
-    state, rates = series.state_at(scene, scratch.c, s), series.rates_at(scene, scratch.c, s)
-    return drives.turn(scene.drive, later(step.now, s)), state, rates
+    forcing, state = drives.turn(scene.drive, later(step.now, s)), series.state_at(scene, scratch.c, s)
+    rates = series.rates_at(scene, scratch.c, s)
+    return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
 
 
-def _state_in_implicit(family, scene, step, scratch, ends, fraction):
-    (_, x), (_, x_next) = ends
+def _violation_in_implicit(family, scene, step, scratch, tolerance, fraction):
+    (_, x), (_, x_next) = _ends(scene, step, scratch)
     forcing, bends = implicit.forcing(scene, scratch.course, step.now, fraction * step.s), scratch.bends[0]
     state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends, fraction))
-    return forcing, state, rosenbrock.dense_rates(x, x_next, bends, fraction, step.s)
-
-
-_ends, _state = either(_ends_of_series, _ends_of_implicit), either(_state_in_series, _state_in_implicit)
-
-
-@inlined
-def _violation(family, scene, step, scratch, ends, tolerance, fraction):
-    forcing, state, rates = _state(family, scene, step, scratch, ends, fraction)
+    rates = rosenbrock.dense_rates(x, x_next, bends, fraction, step.s)
     return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
+
+
+def _energies_in_series(family, scene, step, scratch):
+    """Energies at both ends of a step, J."""
+    after = drives.turn(scene.drive, later(step.now, step.s))
+    before = drives.turn(scene.drive, step.now)
+    return audit_of_model.energy(scene, before, step.y), audit_of_model.energy(scene, after, step.y_next)
+
+
+def _energies_in_implicit(family, scene, step, scratch):
+    (before, _), (after, _) = _ends(scene, step, scratch)
+    return audit_of_model.energy(scene, before, step.y), audit_of_model.energy(scene, after, step.y_next)
+
+
+_violation = either(_violation_in_series, _violation_in_implicit)
+_energies = either(_energies_in_series, _energies_in_implicit)
 
 
 @inlined
@@ -109,12 +114,9 @@ def audit_step(family, scene, step, scratch, tolerance, audit):
     -------
     Audit
     """
-    ends = _ends(family, scene, step, scratch)
-    violation_1, power_1 = _violation(family, scene, step, scratch, ends, tolerance, EARLY)
-    violation_2, power_2 = _violation(family, scene, step, scratch, ends, tolerance, LATE)
-    (forcing, _), (forcing_after, _) = ends
-    before = audit_of_model.energy(scene, forcing, step.y)
-    after = audit_of_model.energy(scene, forcing_after, step.y_next)
+    violation_1, power_1 = _violation(family, scene, step, scratch, tolerance, EARLY)
+    violation_2, power_2 = _violation(family, scene, step, scratch, tolerance, LATE)
+    before, after = _energies(family, scene, step, scratch)
     work, change = 0.5 * step.s * (power_1 + power_2), after - before
     moved = 0.5 * step.s * (abs(power_1) + abs(power_2)) + abs(change)
     violation = max(audit.violation, max(violation_1, violation_2))
@@ -131,7 +133,7 @@ def _fall_rate_in_series(family, scene, step, scratch, guard):
 
 
 def _fall_rate_in_implicit(family, scene, step, scratch, guard):
-    (before, x), (_, x_next) = _ends_of_implicit(family, scene, step, scratch)
+    (before, x), (_, x_next) = _ends(scene, step, scratch)
     late = implicit.forcing(scene, scratch.course, step.now, 0.9 * step.s)
     state = rosenbrock.dense(x, x_next, scratch.bends[0], 0.9)
     view = implicit.guards_and_motion(scene, step.mode, implicit.common(scene, step.mode, before, x), late, state)

@@ -146,7 +146,8 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     if contacts.open == NONE:
         closed = ring_of(scene, contacts.turned)
         view = implicit.guards_and_motion(closed, mode, common, forcing, (x[0], x[1]))
-        return view[0], (joined(implicit.seen(closed, view), (0.0, 0.0, 0.0)), implicit.near_zero(closed, view[1]))
+        shown = joined(implicit.seen(closed, view), (0.0, 0.0, 0.0))
+        return view[0], (view[1][0], view[1][1], view[1][2], shown, implicit.near_zero(closed, view[1]))
     f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, x[1])
     psi_dd, _, normal, _ = pivot.in_slip(f, K)
     gap, speed, (low, high) = gap_measure(scene, mode, x[2]), mode.sign * x[1], region_bounds(scene.law, mode.region)
@@ -157,23 +158,25 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     if contacts.open == FIRST:
         reactions, gaps, loads, guards = (0.0, normal), (gap, 0.0), (0.0, load), (gap, normal)
     acceleration = Located(psi_dd, body.gravity / body.radius + f.psi_square + abs(psi_dd))
-    seen = x[0] + forcing[0], f.psi_dot, *reactions, acceleration, gaps[0], gaps[1], float(contacts.open)
+    psi = x[0] + forcing[0]
+    seen = psi, f.psi_dot, *reactions, acceleration, gaps[0], gaps[1], float(contacts.open)
     near_zero = 0.02 * inertia(body), 0.0, *loads, 0.0, 0.0
-    return (pivot.determinant(f, K), speed - low, *guards, ahead, high - speed), (seen, near_zero)
+    motion = psi, f.psi_dot, psi_dd, seen, near_zero
+    return (pivot.determinant(f, K), speed - low, *guards, ahead, high - speed), motion
 
 
 @implicit.near_zero.implements(ImpactRing)
 def _near_zero(scene, motion):
-    return motion[1]
+    return motion[4]
 
 
 @implicit.seen.implements(ImpactRing)
 def _seen(scene, view):
-    return view[1][0]
+    return view[1][3]
 
 
 @implicit.sought.implements(ImpactRing)
 def _sought(scene, record, view):
-    psi, psi_dot, normal_1, normal_2, _, gap_1, gap_2, _ = view[1][0]
+    psi, psi_dot, normal_1, normal_2, _, gap_1, gap_2, _ = view[1][3]
     most = record.gap_max
     return (*sought(record.base, psi, psi_dot, normal_1, normal_2), (gap_1, 0.0, most), (gap_2, 0.0, most))
