@@ -131,7 +131,7 @@ class Accessor:
         return regime_map(self._ds, var=var, **options)
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Write one page with pictures, thresholds and certificates; see :func:`ringsweep.report.page.report`."""
+        """Write one page with pictures, thresholds and certificates, ``*.html``, as ``ringsweep report`` does."""
         from ringsweep.report.page import report
 
         report(self._ds, path)

@@ -6,7 +6,7 @@ import base64
 import html
 import io
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +59,18 @@ def report(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     parts = [_HEAD.format(title=html.escape(str(ds.attrs.get("title", "ringsweep"))))]
 
     def add(title: str, text: list[str], draw: Callable[[], Figure] | None = None) -> None:
-        parts.extend(_section(title, text, draw))
+        """Add a section: heading, picture and lines; what cannot be drawn says why."""
+        parts.append(f"<h2>{title}</h2>")
+        try:
+            if draw is not None:
+                picture = io.BytesIO()
+                draw().savefig(picture, format="png", dpi=150)
+                data = base64.b64encode(picture.getvalue()).decode()
+                parts.append(f'<img alt="{title}" src="data:image/png;base64,{data}">')
+        except InputError as error:
+            text = [*text, f"no picture: {error}"]
+        if text:
+            parts.append(f"<pre>{html.escape(chr(10).join(text))}</pre>")
 
     def of(variable: str) -> Callable[[], Figure] | None:
         return (lambda: regime_map(ds, var=variable)) if variable in ds else None
@@ -85,20 +96,6 @@ def report(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     parts.append(f'<details><summary>Configuration</summary><pre class="code">{html.escape(scene)}</pre></details>')
     with replacing(path) as temporary:
         Path(temporary).write_text("\n".join(parts) + "</body></html>\n", encoding="utf-8")
-
-
-def _section(title: str, lines: list[str], draw: Callable[[], Figure] | None) -> Iterator[str]:
-    """Heading, picture and lines of a section; what cannot be drawn says why."""
-    yield f"<h2>{title}</h2>"
-    try:
-        if draw is not None:
-            picture = io.BytesIO()
-            draw().savefig(picture, format="png", dpi=150)
-            yield f'<img alt="{title}" src="data:image/png;base64,{base64.b64encode(picture.getvalue()).decode()}">'
-    except InputError as error:
-        lines = [*lines, f"no picture: {error}"]
-    if lines:
-        yield f"<pre>{html.escape(chr(10).join(lines))}</pre>"
 
 
 def _figure(panel: Callable[..., Any], ds: xr.Dataset) -> Figure:
