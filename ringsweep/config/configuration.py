@@ -172,6 +172,7 @@ def _document(
             raise InputError("axes", f"a mapping of paths to values is expected, got {show(axes)}")
         doc.tree["sweep"], doc.result_axes = {}, None
         doc.columns = [(path, f"axes[{path!r}]", path, given) for path, given in axes.items()]
+        doc.locations |= dict.fromkeys((where for _, where, *_ in doc.columns), (None, None))
     for key, given in parts.items():
         place, section = (key, doc.tree) if key in _SECTIONS else (f"sweep.{key}", doc.tree.get("sweep", {}))
         if given is None or not isinstance(section, dict) or (given is True and section.get(key)):
@@ -180,6 +181,8 @@ def _document(
             doc.tree["sweep"] = section
         section[key] = yaml_text.read({key: given}).tree[key]
         doc.locations = {path: line for path, line in doc.locations.items() if not f"{path}.".startswith(f"{place}.")}
+        # No line of the file is at fault for what a program gives.
+        doc.locations[place] = None, None
     return doc
 
 

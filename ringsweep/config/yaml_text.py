@@ -62,7 +62,7 @@ class Document:
     tree: dict[str, Any]
     folder: Path = field(default_factory=Path)
     name: str = "ringsweep"
-    locations: dict[str, tuple[str, int | None]] = field(default_factory=dict)
+    locations: dict[str, tuple[str | None, int | None]] = field(default_factory=dict)
     result_axes: dict[str, tuple[tuple[str, ...], Any]] | None = None
     columns: list[tuple[Any, str, str, Any]] | None = None
 
@@ -243,7 +243,7 @@ class _Reader:
 
     def __init__(self, file: str | None = None):
         self.file = file
-        self.locations: dict[str, tuple[str, int | None]] = {}
+        self.locations: dict[str, tuple[str | None, int | None]] = {}
         self.count = 0
 
     def value(self, given: Any, path: str = "", depth: int = 0) -> Any:
