@@ -9,7 +9,7 @@ import numpy as np
 from ringsweep.config.axes import Axes, by_law
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
-from ringsweep.models.scene import Scene
+from ringsweep.models.scene import LAW, Scene, Structure
 
 # Cells that are checked at once: many zones over many points must not fill the memory.
 _CELLS_AT_ONCE = 4096
@@ -43,7 +43,8 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
             try:
                 made = batch(structure, values)
             except InputError as error:
-                error.problem += " (in a cell of the sweep)" if axes.sizes else ""
+                if _comes_from_sweep(structure, scene, axes, error):
+                    error.problem += " (in a cell of the sweep)"
                 raise
             if needed and not periodic:
                 periodic = bool(np.isfinite(made.forcing_period).any())
@@ -51,3 +52,22 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
         others = "give one, or state it by `period`" + (", or take `turn`" if "turn" in able else "")
         where = "record.section.at" if section is not None else "record.exponent"
         raise InputError(where, f"neither force nor drive has a period: {others}")
+
+
+def _comes_from_sweep(structure: Structure, scene: Scene, axes: Axes, error: InputError) -> bool:
+    """Whether a contradiction comes from swept values.
+
+    It does not if the scene alone has the same contradiction. Values that only the sweep gives are tried at their least
+    and at their greatest.
+    """
+    if error.path.removeprefix("scene.") in axes.columns:
+        return True
+    for extreme in (np.min, np.max):
+        swept = {path: extreme(column) for path, (_, column) in axes.columns.items() if path != LAW}
+        try:
+            batch(structure, {path: np.array([value]) for path, value in {**swept, **scene.values}.items()})
+        except InputError as without_sweep:
+            if str(without_sweep) == str(error):
+                continue
+        return True
+    return False
