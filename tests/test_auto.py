@@ -23,7 +23,7 @@ from ringsweep.quantities.flags import (
     REVOLVING,
     SEPARATING,
 )
-from ringsweep.solvers import event
+from ringsweep.solvers import certificate, event
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
@@ -133,7 +133,7 @@ class TestCertificate:
         assert (found.steps[disagree] > first.steps[disagree] + second.steps[disagree]).all()
 
     def test_cells_without_certificate_are_run_again_a_limited_number_of_times(self, monkeypatch, calls, launches):
-        monkeypatch.setattr(event, "doubts", lambda batch, rows, *_: np.full(len(rows), CLOSE_CALL, dtype=np.int8))
+        monkeypatch.setattr(certificate, "undecided", lambda batch, one, *_: np.ones_like(one.regime, dtype=bool))
         found = solve(Event(), launches)
         assert not found.certified.any()
         assert (found.because == CLOSE_CALL).all()

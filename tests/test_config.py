@@ -721,8 +721,8 @@ def test_solver_is_read_with_its_options():
 
 def test_what_a_program_puts_into_a_file_is_no_fault_of_the_file(write):
     file = write(TEXT)
-    for given in ({"axes": {"drive.amplitud": [1]}}, {"solver": {"method": "rk5"}}, {"follow": "nothing"}):
-        assert refusal(load, file, **given).file is None
+    for part in ({"axes": {"drive.amplitud": [1]}}, {"solver": {"method": "rk5"}}, {"follow": "nothing"}):
+        assert refusal(load, file, **part).file is None
     assert refusal(load, write(TEXT.replace("mass: 0.076", "mass: -1")), axes={"drive.amplitude": [1]}).line == 3
 
 
