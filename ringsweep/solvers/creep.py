@@ -361,10 +361,11 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             return event, 0.0, y, record, control, 0.0
     fractions = scratch.work[0]
     record = recorder.enter(scene, record, now.t, implicit.seen(scene, before))
-    count = _extremes(scene, record, start, scratch, taken, (before, middle, after))
-    for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
-        fractions[count] = i / INSTANTS
-        count += 1
+    count, looks = _extremes(scene, record, start, scratch, taken, (before, middle, after))
+    if looks or near:
+        for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
+            fractions[count] = i / INSTANTS
+            count += 1
     due = (variation.due(scene, record) - now.t) - now.rest
     if 0.0 < due < h:
         fractions[count] = due / h
@@ -377,7 +378,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         view = after if fraction == 1.0 else middle
         if fraction != 0.5 and fraction != 1.0:
             view = _view_within(scene, start, scratch, taken, fraction)
-        if fraction != 1.0 and _sets_record(scene, record, (before, view, after)):
+        if looks and fraction != 1.0 and _sets_record(scene, record, (before, view, after)):
             # A step of the method is more exact than the dense output, whose error may be that of the whole step.
             there = implicit.forcing(scene, course, now, fraction * h)
             state, _ = _step(scene, start, course, fraction * h, there, scratch.bends[1])
@@ -413,7 +414,8 @@ def _extremes(scene, record, start, scratch, taken, views):
     on small errors of the instant. The acceleration would tell the instant worse: where friction rises steeply, it
     magnifies the error of the dense output.
 
-    `views` are those at the beginning, in the middle and at the end of the step. The number of fractions is returned.
+    `views` are those at the beginning, in the middle and at the end of the step. The number of fractions is returned, and
+    whether any of these quantities may set a record within the step, or turn.
     """
     work, row, count = scratch.work[:-1], scratch.work[-1], 0
     before, within, after = views[0][1], views[1][1], views[2][1]
@@ -430,7 +432,7 @@ def _extremes(scene, record, start, scratch, taken, views):
     for q in range(1, len(first)):
         found = found or _may_turn(first[q], middle[q], last[q])
     if not found:
-        return 0
+        return 0, False
     early = implicit.sought(scene, record, _view_within(scene, start, scratch, taken, 0.25))
     late = implicit.sought(scene, record, _view_within(scene, start, scratch, taken, 0.75))
     for q in range(1, len(first)):
@@ -445,7 +447,7 @@ def _extremes(scene, record, start, scratch, taken, views):
         if may_turn:
             differentiate(row, row)
             count = crossings(row, 1.0, work, count)
-    return count
+    return count, True
 
 
 @inlined
