@@ -217,13 +217,17 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+# Commands that other programs have, and what does the same here.
+_ELSEWHERE = {"help": "--help", "version": "--version", "sweep": "run"}
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser whose messages quote only the start of a long argument."""
 
     def error(self, message: str) -> NoReturn:
         """End the process with a message."""
         if wrong := re.match(r"argument COMMAND: invalid choice: '([^']*)' \(choose from (.*)\)", message):
-            near = nearest_name(wrong[1], re.findall(r"[a-z]+", wrong[2]))
+            near = _ELSEWHERE.get(wrong[1]) or nearest_name(wrong[1], re.findall(r"[a-z]+", wrong[2]))
             message += f"; did you mean `{near}`?" if near else ""
         super().error(shortened(message, 1000))
 
