@@ -1,5 +1,6 @@
 """What a motion on the belt settles to is decided by evidence that does not hang on the end of the span."""
 
+import json
 import re
 from math import pi
 from types import SimpleNamespace
@@ -10,8 +11,10 @@ from belts import on_belt, with_all_parts
 from scipy.integrate import solve_ivp
 
 import ringsweep
+from ringsweep.config import load
 from ringsweep.models import cycles
 from ringsweep.physics import belt
+from ringsweep.runs.warnings import warn_of_results
 
 
 def scene(law, omega, amplitude, *, x=0.0, v_belt=1.0, cubic=0.0, damping=0.0, **friction):
@@ -108,6 +111,14 @@ def test_span_that_the_warning_names_is_enough_to_show_a_torus(caplog):
     needed = float(re.search(r"that of a torus, takes about (\S+) s", caplog.text).group(1))
     assert 100 * period < needed < 1000 * period
     assert words(over(of, 0.6, [needed / period], True)) == ["quasi-periodic"]
+
+
+def test_warning_names_no_span_that_is_shorter_than_the_one_of_the_run(caplog):
+    found = over(cubic(0.6, 0.8), 0.6, [1000], True)
+    found["settled"][:] = 0
+    warn_of_results(found, load(json.loads(found.attrs["configuration"])))
+    assert "the motion has not settled" in caplog.text
+    assert "that of a torus" not in caplog.text
 
 
 def test_word_does_not_change_where_the_span_passes_a_power_of_two_periods():

@@ -109,7 +109,8 @@ def _hint_at_a_torus(results: xr.Dataset, config: Config) -> str:
             model = model_of(structure)
             assert isinstance(model, Continues)
             change = (abs(rate) + POSITIVE * error).flat[cells[own]] * model.forcing_period(structure, values)
-            needed.append(change / ZERO * ended.flat[cells[own]])
+            # Where the error is small enough already, something else is not settled.
+            needed.append((change / ZERO * ended.flat[cells[own]])[change > ZERO])
     spans = np.concatenate([*needed, []])
     if not np.isfinite(spans).any():
         return ""
