@@ -172,9 +172,9 @@ def test_results_on_disk_are_read_chunk_by_chunk(tmp_path, caplog):
 
 
 def test_map_that_one_word_fills_says_what_to_look_at(caplog):
-    def told(regimes, scene=SCENE):
+    def told(regimes, scene=SCENE, **more):
         caplog.clear()
-        found = {
+        found = more | {
             "regime": (("x", "y"), regimes),
             "t_end": (("x", "y"), np.linspace(1.0, 2.0, regimes.size).reshape(regimes.shape)),
         }
@@ -184,6 +184,7 @@ def test_map_that_one_word_fills_says_what_to_look_at(caplog):
 
     regimes = np.full((5, 5), OSCILLATORY, dtype="int8")
     assert told(regimes)[0].startswith("all 25 cells are oscillatory: do the axes reach far enough")
+    assert not told(regimes, phi_section=(("x", "y", "section"), np.zeros((5, 5, 2))))
     assert not told(regimes[:3, :3])
     belt = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}}
     belt |= {"friction": {"law": "coulomb", "mu_k": 0.1}, "time": {"span": 1.0}}

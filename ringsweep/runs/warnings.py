@@ -63,7 +63,8 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
             start += regime.size
         if settled is not None:
             unsettled += int(np.count_nonzero((settled == 0) & ~np.isin(regime, _ENDED)))
-    if size >= _MAP and np.count_nonzero(cells) == 1:
+    # Of a sweep with sections one looks at these.
+    if size >= _MAP and np.count_nonzero(cells) == 1 and "section" not in results.dims:
         _hint_at_one_word(REGIMES[int(cells.argmax())], size, config)
     if unstable:
         if np.isfinite(largest):
