@@ -40,6 +40,23 @@ class Accessor:
 
         return words(self._ds[var])
 
+    def where(self, **classes: str) -> xr.Dataset:
+        """The cells of some classes, such as ``regime="separating"``; the others are NaN, as with `where` of xarray.
+
+        Raises
+        ------
+        InputError
+            If the dataset has no such classification, or the classification no such word.
+        """
+        from ringsweep.plots.datasets import resolve
+        from ringsweep.quantities.variables import meanings_of
+
+        found = self._ds
+        for name, word in classes.items():
+            known = self.words(resolve("where", name, self._ds))
+            found = found.where(known == resolve(name, word, meanings_of(self._ds[name]).values()))
+        return found
+
     def to_frame(self, along: str | None = None) -> pd.DataFrame:
         """Table with a row for each cell: coordinates, then variables, with classifications as categories of words.
 

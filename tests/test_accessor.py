@@ -33,6 +33,21 @@ def test_words_and_boundary_are_those_of_the_functions(ds):
     )
 
 
+def test_where_keeps_the_cells_of_classes_and_refuses_words_that_there_are_not(ds):
+    lost = ds.ringsweep.where(regime="separating", certified="certified")
+    inside = (ringsweep.words(ds.regime) == "separating") & (ds.certified == 1)
+    xr.testing.assert_equal(lost.t_separation, ds.t_separation.where(inside))
+    assert int(lost.regime.count()) == int(inside.sum()) > 0
+    assert ringsweep.words(lost.regime).values[inside.values].tolist() == ["separating"] * int(inside.sum())
+    for wrong, message in (
+        ({"regime": "separeting"}, "did you mean separating"),
+        ({"regim": "separating"}, "did you mean regime"),
+        ({"t_end": "separating"}, "t_end"),
+    ):
+        with pytest.raises(ringsweep.InputError, match=message):
+            ds.ringsweep.where(**wrong)
+
+
 def test_run_of_a_cell_has_the_outcome_of_that_cell(ds):
     run = ds.ringsweep.simulate(drive_amplitude=2, zone_half_angle="15 deg")
     xr.testing.assert_identical(
