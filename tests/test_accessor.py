@@ -102,6 +102,27 @@ def test_report_has_pictures_thresholds_and_citation_and_needs_no_network(ds, sc
         assert text in page
 
 
+def test_report_tells_each_change_once_and_words_of_its_model(tmp_path):
+    """A small body in a drum: most runs are oscillatory, some separate, two revolve."""
+    drum = {"model": "ring-single-contact", "body": {"mass": 2.5}, "ring": {"radius": 0.3}, "zone": {"half_angle": 0.9}}
+    drum |= {
+        "friction": {"law": "stiction", "rough": {"mu_s": 0.6, "mu_k": 0.45}, "elsewhere": {"mu_s": 0.25, "mu_k": 0.2}}
+    }
+    drum |= {"drive": {"law": "constant", "amplitude": 5.0}, "time": {"span": 20.0}}
+    sample = {"n": 16, "of": {"friction.rough.mu_k": {"uniform": "0.45 +- 5 %"}}}
+    sweep = {"grid": {"drive.amplitude": ["40 rpm", "50 rpm", "105 rpm"]}}
+    for name, more in (("plain", {}), ("sampled", {"sample": sample})):
+        found = ringsweep.run({"scene": drum, "sweep": sweep | more}, progress=False)
+        found.ringsweep.report(tmp_path / f"{name}.html")
+        page = html.unescape((tmp_path / f"{name}.html").read_text(encoding="utf-8"))
+        assert "along drive.amplitude" in page
+        assert ("what is uncertain has its median" in page) == (name == "sampled")
+        assert "separating begins at drive.amplitude" in page
+        assert "oscillatory ends at drive.amplitude" not in page
+        assert "oscillatory: at least one reversal" in page
+        assert "belt" not in page
+
+
 def test_report_that_cannot_be_written_leaves_the_older_one(ds, tmp_path, monkeypatch):
     (tmp_path / "my.html").write_text("older")
     monkeypatch.setattr(Path, "write_text", lambda *_, **__: (_ for _ in ()).throw(OSError("full")))

@@ -76,7 +76,10 @@ def report(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         return (lambda: regime_map(ds, var=variable)) if variable in ds else None
 
     add("The map", ["; ".join(scene_text(ds)), *lines["regimes"]], lambda: regime_map(ds))
-    add("What the words mean", [f"{word}: {DEFINITIONS[word]}" for word in occurring])
+    # Of "ring: ...; belt: ..." the part of the model.
+    model = "belt" if configuration["scene"]["model"] == "belt" else "ring"
+    meanings = {word: DEFINITIONS[word].rpartition(f"{model}: ")[2].partition("; belt: ")[0] for word in occurring}
+    add("What the words mean", [f"{word}: {meaning}" for word, meaning in meanings.items()])
     if thresholds := _thresholds(ds, configuration, occurring):
         add("Where regimes begin and end", thresholds)
     if "separating_contact" in ds and "separating" in occurring:
@@ -117,7 +120,7 @@ def _words(ds: xr.Dataset) -> list[str]:
 def _thresholds(ds: xr.Dataset, configuration: dict[str, Any], occurring: list[str]) -> list[str]:
     """Where each regime but one begins and ends along each axis, with the values of the other axes.
 
-    Where all others begin or end, that one ends or begins. It is none in which a contact is lost or the body jams.
+    Where all others begin or end, that one ends or begins: the most frequent one that neither loses a contact nor jams.
     """
     from ringsweep.runs.probabilities import nominal
     from ringsweep.runs.thresholds import SCAN, in_words, threshold
@@ -130,15 +133,18 @@ def _thresholds(ds: xr.Dataset, configuration: dict[str, Any], occurring: list[s
     if (configuration.get("sweep") or {}).get("follow"):
         return ["cells follow each other, so a threshold depends on the cells before"]
     config = nominal(ds).source if is_sampled(ds) else configuration
+    fixed = ["what is uncertain has its median"] if is_sampled(ds) else []
     # A scene need not have a value for what is swept: then the one in the middle is taken.
     middle = {path: one.values.flat[one.size // 2].item() for path, one in axes.items()}
     missing = {path: value for path, value in middle.items() if written(config, path) is None}
+    left_out = next((word for word in occurring if word not in ("separating", "jammed")), occurring[0])
     lines = []
     for path in axes:
         others = {other: missing.get(other, written(config, other)) for other in axes if other != path}
-        lines.append(", ".join([f"along {path}", *(f"{other} = {value}" for other, value in others.items())]) + ":")
+        given = [f"{other} = {value}" for other, value in others.items()]
+        lines.append(f"{', '.join([f'along {path}', *fixed, *given])}:")
         settings = {other: value for other, value in others.items() if other in missing}
-        for regime in sorted(occurring, key=lambda word: word not in ("separating", "jammed"))[:-1]:
+        for regime in (word for word in occurring if word != left_out):
             try:
                 found = threshold(config, path, regime, set=settings)
             except InputError as error:
