@@ -102,6 +102,7 @@ def test_report_has_pictures_thresholds_and_citation_and_needs_no_network(ds, sc
         assert text in page
 
 
+@pytest.mark.slow
 def test_report_tells_each_change_once_and_words_of_its_model(tmp_path):
     """A small body in a drum: most runs are oscillatory, some separate, two revolve."""
     drum = {"model": "ring-single-contact", "body": {"mass": 2.5}, "ring": {"radius": 0.3}, "zone": {"half_angle": 0.9}}

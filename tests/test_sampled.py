@@ -459,15 +459,20 @@ def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatc
         ["run", "my.nc", "-o", "again.nc", "--jobs", "1"],
         ["map", "my.nc", "--boundaries", "riding", "--tolerance", "1e-3", "-o", "boundary.png"],
         ["map", "my.nc", "--var", "survival", "-o", "survival.png"],
+        ["map", "my.nc", "-o", "my.html"],
         ["plot", "my.nc", "-o", "both.png"],
         ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9"],
         ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9", "--kind", "survival", "-o", "s.pdf"],
         ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9", "--kind", "sensitivity"],
     ):
         assert main(arguments) == 0, arguments
+    page = (tmp_path / "my.html").read_text(encoding="utf-8")
+    assert '"value":"probability"' in page
+    assert '"regime = riding"' in page
+    assert '"regime = jammed"' not in page
     capsys.readouterr()
     for arguments, words in (
-        (["map", "my.nc", "-o", "my.html"], "no runs to point at"),
+        (["map", "one.nc", "-o", "one.html"], "one.nc: a single cell has no map"),
         (["plot", "my.nc", "--kind", "survival"], "has several cells: hold belt_velocity (4), time_span (4)"),
         (["plot", "my.nc", "--kind", "phase"], "--kind phase: is not for a sampled sweep"),
         (["plot", "my.nc", "--word", "riding"], "--kind sensitivity"),

@@ -5,7 +5,7 @@ A dataset made by hand has no attributes. So names of dimensions and variables d
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from itertools import chain
 from typing import Any
@@ -73,6 +73,16 @@ WITHIN = ("word", "parameter", "quantile", "survival_time", "replicate", "certif
 def is_sampled(ds: xr.Dataset) -> bool:
     """Whether a dataset holds probabilities, and no runs."""
     return "word" in ds.coords and "probability" in ds
+
+
+def mapped(ds: xr.Dataset, var: str, sel: Mapping[str, Any]) -> tuple[xr.Dataset, str]:
+    """What a map shows, and its variable: of a sampled sweep the probability, of the regimes that occur."""
+    if is_sampled(ds):
+        var = "probability" if var == "regime" else var
+        if "word" not in sel and "word" in ds.dims:
+            occurs = ds["probability"] > 0.0
+            ds = ds.isel(word=occurs.any([dim for dim in occurs.dims if dim != "word"]).values)
+    return ds, resolve("var", var, numeric_names(ds))
 
 
 def require_sample(ds: xr.Dataset, name: str) -> xr.Dataset:

@@ -155,7 +155,7 @@ def choose_axes(
     held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
     ds, held_now = select(ds, sel)
     data = ds[var]
-    if not data.dims:
+    if not data.dims or not (x or set(data.dims) - set(WITHIN)):
         raise InputError("sel" if sel else "ds", "a single cell has no map; at least one swept dimension must remain")
     candidates: list[str] = []
     for dim in [dim for dim in data.dims if dim not in WITHIN]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots import labels, look, map_colours
-from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve, scene_text
+from ringsweep.plots.datasets import is_sampled, mapped, require_sweep, scene_text
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
 from ringsweep.plots.probability import probability_panel
 from ringsweep.plots.sections import bifurcation, has_circle, has_diagram, multiplier_circle, points_of
@@ -260,13 +260,7 @@ class Map:
     def __init__(self, ds: xr.Dataset, axes: Pair, var: str, sel: Any, colours: Pair = (None, None), units: Any = None):
         require_sweep(ds)
         ds, sel = labels.in_units(ds, units), sel or {}
-        if is_sampled(ds):
-            var = "probability" if var == "regime" else var
-            # Regimes that occur nowhere have no map.
-            if "word" not in sel and "word" in ds.dims:
-                occurs = ds["probability"] > 0.0
-                ds = ds.isel(word=occurs.any([dim for dim in occurs.dims if dim != "word"]).values)
-        var = resolve("var", var, numeric_names(ds))
+        ds, var = mapped(ds, var, sel)
         if var in POINTS:
             raise InputError("var", f"{var} are the points of sections: plots.bifurcation draws them")
         self.ds, held, horizontal, vertical = choose_axes(ds, var, sel, *axes)

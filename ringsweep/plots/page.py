@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots import look
-from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve
+from ringsweep.plots.datasets import mapped, numeric_names, require_sweep
 from ringsweep.plots.labels import axis_label, displayed, in_units, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import ZERO, ColourScale
@@ -151,9 +151,7 @@ class _Sweep:
         """Choose the axes, and put the cells in their order; arguments and errors as for :func:`save_page`."""
         require_sweep(ds)
         ds = in_units(ds)
-        if is_sampled(ds):
-            raise InputError("ds", "is a sampled sweep, which has no runs to point at: draw a picture, *.png")
-        var = resolve("var", var, numeric_names(ds))
+        ds, var = mapped(ds, var, sel)
         ds, held, horizontal, vertical = choose_axes(ds, var, sel, x, y)
         notes = [*held, *audit_texts(ds)]
         axes = [axis for axis in (vertical, horizontal) if axis]
