@@ -58,6 +58,7 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"of": {"body.mass": {"uniform": "1 kg ± 5"}}}, "sweep.sample.of.body.mass.uniform", "the tolerance has no unit"),
     ({"of": {"body.mass": {"uniform": "1 kg ± 5 s"}}}, "sweep.sample.of.body.mass.uniform", "is in kg"),
     ({"of": {"body.mass": {"uniform": "10 %"}}}, "sweep.sample.of.body.mass.uniform", "or 0.1 ± 10 % is expected"),
+    ({"of": {"body.mass": {"uniform": ["±10 %"]}}}, "sweep.sample.of.body.mass.uniform", "or 0.1 ± 10 % is expected"),
     ({"of": {"body.mass": {"uniform": "0 ± 10 %"}}}, "sweep.sample.of.body.mass.uniform", "give the tolerance itself"),
     ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
     ({"keep": 1}, "sweep.sample.keep", "true or false"),

@@ -322,7 +322,8 @@ def _numbers(given: Any, kind: str, parameter: Parameter, where: str) -> tuple[f
     if tolerated := kind == "uniform" and isinstance(given, str):
         arguments, given = ("mean", "tolerance"), _mean_and_tolerance(given, where)
     if not isinstance(given, list) or len(given) != len(arguments):
-        raise InputError(where, f"[{wanted}] is expected, got {show(given)}")
+        tolerance = " or 0.1 ± 10 %" if kind == "uniform" else ""
+        raise InputError(where, f"[{wanted}]{tolerance} is expected, got {show(given)}")
     found: list[float] = []
     for k, (what, value) in enumerate(zip(arguments, given, strict=True)):
         at, scatter = where if tolerated else f"{where}.{k}", what in ("standard deviation", "tolerance")
