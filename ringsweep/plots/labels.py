@@ -141,7 +141,9 @@ def unit_text(data: xr.DataArray) -> str:
 
 
 def value_text(value: xr.DataArray) -> str:
-    """One value of a coordinate with its name and unit."""
+    """One value of a coordinate with its name and unit; a word of a sampled sweep stands alone."""
+    if value.name == "word":
+        return str(value.item())
     return f"{long_name(value)} = {amount_text(value) if is_numeric(value) else value.item()}"
 
 
