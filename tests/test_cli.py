@@ -92,6 +92,10 @@ REFUSED = [
         "unknown key: model belt has `spring`, this is model ring",
     ),
     ("run case.yaml --set body.mas=1", "--set body.mas=1: scene.body.mas: unknown key; did you mean `mass`?"),
+    (
+        "run case.yaml --dry-run --json",
+        "--dry-run: measures threads of this machine, and prints text: leave --json out",
+    ),
     ("run case.yaml --set mass=2", "scene.mass: unknown key; did you mean `body.mass`?"),
     ("run case.yaml --set friction.rough.mu=2", "scene.friction.rough.mu: unknown key; did you mean `mu_"),
     (

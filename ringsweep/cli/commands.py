@@ -72,8 +72,9 @@ def run_command(arguments: argparse.Namespace) -> int:
     if arguments.dry_run:
         from ringsweep.runs.needs import describe
 
-        if arguments.scheduler is not None:
-            raise InputError("--dry-run", "measures threads of this machine: leave --backend dask out")
+        for option, given in (("--backend dask", arguments.scheduler), ("--json", arguments.json)):
+            if given:
+                raise InputError("--dry-run", f"measures threads of this machine, and prints text: leave {option} out")
         print(describe(config, target, arguments.jobs, arguments.reuse))
         return 0
 
