@@ -8,11 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from ringsweep import plots
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_sampled, resolve
+from ringsweep.plots.look import panel
 from ringsweep.plots.maps import Map, suitable
 from ringsweep.plots.sections import points_of
 from ringsweep.plots.selection import select, select_grid
@@ -165,13 +164,6 @@ def save(figure: Any, picture: Path) -> None:
     """Save a figure, and say so."""
     plots.save(figure, picture)
     print(f"wrote {picture}")
-
-
-def panel(draw: Callable[..., Any], result: Any, height: float = 4.2, **options: Any) -> Any:
-    """A new figure with one picture."""
-    figure = Figure(figsize=(7.6, height), layout="constrained")
-    draw(result, ax=figure.add_subplot(), **options)
-    return figure
 
 
 def selection_of(text: str) -> tuple[str, str]:

@@ -6,6 +6,7 @@ import io
 import math
 import re
 import textwrap
+from collections.abc import Callable
 from typing import Any, Literal
 
 import matplotlib
@@ -205,6 +206,13 @@ class Picture(Figure):
         written = io.BytesIO()
         self.savefig(written, format="png")
         return written.getvalue()
+
+
+def panel(draw: Callable[..., Any], result: Any, height: float = 4.2, **options: Any) -> Picture:
+    """A new figure with one picture."""
+    figure = Picture(figsize=(7.6, height), layout="constrained")
+    draw(result, ax=figure.add_subplot(), **options)
+    return figure
 
 
 def axes_or_current(ax: Axes | None, height: float) -> Axes:

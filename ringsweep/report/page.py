@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, scene_text
+from ringsweep.plots.look import panel
 from ringsweep.plots.maps import regime_map
 from ringsweep.plots.probability import sensitivity_panel, survival_panel
 from ringsweep.plots.saving import suffix_of
@@ -88,9 +89,9 @@ def report(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         cure = ["a run ends where a contact is lost; with scene.impact, such as {restitution: 0.5}, it goes on"]
         add("What follows a lost contact", lines.get("aftermath", cure), of("aftermath"))
     if "sobol_first" in ds:
-        add("What the regime depends on", [], lambda: _figure(sensitivity_panel, ds))
+        add("What the regime depends on", [], lambda: panel(sensitivity_panel, ds))
     if "survival" in ds:
-        add("How long it holds", [], lambda: _figure(survival_panel, ds))
+        add("How long it holds", [], lambda: panel(survival_panel, ds))
     if "shocks" in lines:
         add("Shocks", lines["shocks"], of("jump_max"))
     add("How sure it is", lines["certificates"])
@@ -99,12 +100,6 @@ def report(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     parts.append(f'<details><summary>Configuration</summary><pre class="code">{html.escape(scene)}</pre></details>')
     with replacing(path) as temporary:
         Path(temporary).write_text("\n".join(parts) + "</body></html>\n", encoding="utf-8")
-
-
-def _figure(panel: Callable[..., Any], ds: xr.Dataset) -> Figure:
-    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
-    panel(ds, ax=figure.add_subplot())
-    return figure
 
 
 def _words(ds: xr.Dataset) -> list[str]:
