@@ -76,17 +76,14 @@ class Accessor:
         """
         import pandas as pd
 
-        from ringsweep.errors import InputError
+        from ringsweep.plots.datasets import resolve
         from ringsweep.quantities.variables import is_classification, meanings_of
 
         ds = self._ds
         if along is None and "time" in ds.dims:
             along = "time"
         if along is not None:
-            if along not in ds.dims:
-                raise InputError(
-                    "along", f"{along!r} is no dimension: {', '.join(map(str, ds.dims)) or 'there is none'}"
-                )
+            along = resolve("along", along, ds.dims)
             ds = ds[[name for name, variable in ds.data_vars.items() if along in variable.dims]]
         elif "probability" in ds:
             # A table of all variables would have a row for each combination of their dimensions.

@@ -74,7 +74,7 @@ def test_frames_of_a_history_have_a_row_for_each_sample_or_event(ds):
     assert frame.phi.tolist() == run.phi.values.tolist()
     assert events.event_time.tolist() == run.event_time.values.tolist()
     assert events.event_kind.tolist() == ringsweep.words(run.event_kind).values.tolist()
-    with pytest.raises(ringsweep.InputError, match="no dimension"):
+    with pytest.raises(ringsweep.InputError, match="'point' is not in the dataset, which has time"):
         run.ringsweep.to_frame("point")
 
 

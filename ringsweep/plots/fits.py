@@ -1,4 +1,4 @@
-"""look.Picture of a fit: measurements, the fitted history, residuals."""
+"""Picture of a fit: measurements, the fitted history, residuals."""
 
 from __future__ import annotations
 
