@@ -109,12 +109,15 @@ class TestThreshold:
         with netcdf.open_dataset(output) as written:
             assert written.body_mass.item() == pytest.approx(1e-3 * one["value"])
 
-    def test_interval_without_a_change_has_no_threshold(self, tmp_path, capsys):
+    def test_interval_without_a_change_has_no_threshold(self, tmp_path, capsys, caplog):
         config = tmp_path / "belt.yaml"
         config.write_text(json.dumps({"scene": BELT, "sweep": {"grid": {"friction.mu_s": [0.3, 0.4]}}}))
-        assert cli.main(["threshold", str(config), "--path", "friction.mu_s", "--regime", "riding", "--scan", "5"]) == 0
+        assert (
+            cli.main(["threshold", str(config), "--path", "friction.mu_s", "--regime", "riding", "--scan", "20"]) == 0
+        )
         out, err = capsys.readouterr()
-        assert "riding neither begins nor ends along friction.mu_s\nscan: 5 runs from 0.3 to 0.4: 5 riding" in out
+        assert "riding neither begins nor ends along friction.mu_s\nscan: 20 runs from 0.3 to 0.4: 20 riding" in out
+        assert "do the axes reach far enough" not in caplog.text
         assert not err
 
 

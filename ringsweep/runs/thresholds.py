@@ -22,6 +22,7 @@ from ringsweep.quantities.variables import QUANTILE_ENDS, common_unit, in_unit, 
 from ringsweep.runs.boundaries import bisect, check_word, located, run_points, word_in
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.sweep import compute
+from ringsweep.runs.warnings import warn_of_results
 from ringsweep.statistics import quantiles
 from ringsweep.storage.provenance import attributes
 
@@ -136,7 +137,8 @@ def threshold(
     if one.axes.sizes:
         raise InputError("sweep", "several friction laws, but a threshold is that of one: --set friction.law=...")
     scanned = load(dict(one.source) | {"sweep": {"grid": {path: values.tolist()}}})
-    runs = compute(scanned, Execution(jobs, progress=False))
+    runs = compute(scanned, Execution(jobs, progress=False), warn=False)
+    warn_of_results(runs, scanned, counted=True)
     name = dimension(path)
     sure = runs.isel({name: (runs["certified"].values == 1) | (not scanned.certifies)})
     found = located(sure, regime, scanned, allowed, jobs=jobs)

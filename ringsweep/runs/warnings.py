@@ -33,7 +33,7 @@ logger = logging.getLogger("ringsweep")
 _MANY_UNSURE = 0.01
 
 
-def warn_of_results(results: xr.Dataset, config: Config) -> None:
+def warn_of_results(results: xr.Dataset, config: Config, *, counted: bool = False) -> None:
     """Warn of steps beyond the limit of stability, of motions that have not settled, and of runs that end at t = 0.
 
     Parameters
@@ -42,6 +42,8 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
         Outcomes of all cells, in memory or on disk. They are read chunk by chunk.
     config : Config
         Configuration of the runs.
+    counted : bool
+        Whether the caller says how many runs have each regime: then nothing is said of one that all have.
     """
     size = count = results["t_end"].size
     ended_at_start = unstable = unsettled = start = 0
@@ -64,7 +66,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
         if settled is not None:
             unsettled += int(np.count_nonzero((settled == 0) & ~np.isin(regime, _ENDED)))
     # Of a sweep with sections one looks at these.
-    if size >= _MAP and np.count_nonzero(cells) == 1 and "section" not in results.dims:
+    if size >= _MAP and np.count_nonzero(cells) == 1 and "section" not in results.dims and not counted:
         _hint_at_one_word(REGIMES[int(cells.argmax())], size, config)
     if unstable:
         if np.isfinite(largest):
