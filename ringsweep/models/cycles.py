@@ -11,7 +11,7 @@ The place x of the body is a displacement, or an angle on a ring; lengths in m a
 
 from __future__ import annotations
 
-from math import inf, isnan, nan, pi, sqrt
+from math import inf, isnan, log2, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, feature, inlined
@@ -165,6 +165,9 @@ _EXACT, _LAPS, _LAPS_IF_FREE = 1e-7, 4.0, 1.0
 
 # A change that would add up to less than this share of the swing in so many spans is no trend.
 _TREND, _SPANS = 0.1, 10.0
+
+# So many times the time up to now doubles until then.
+_DOUBLINGS = log2(1.0 + _SPANS)
 
 # Gaps of laps shrink if the last one is less than this share of the first one.
 _SHRUNK = 0.3
@@ -383,13 +386,16 @@ def returns_each_time(scene, c, forced, fast, largest_multiplier, growth):
     changed = gap(scene, laps.older.mark, c.reference.x, c.reference.velocity, c.swing, fast)
     change = changed / (laps.number - laps.older.number)
     # Laps of many cycles are few: there as many must come as there are cycles.
-    to_come = change * (soon * max(c.lap, 1.0) / c.period)
+    to_come = merge = change * (soon * max(c.lap, 1.0) / c.period)
     if laps.gap < _SHRUNK * laps.first_gap:
+        # Near a bifurcation states that become one approach as a power of time, more slowly than a geometric series:
+        # while the time doubles, the change is at most that of the later half of the laps.
+        merge = min(merge, changed * _DOUBLINGS)
         # Gaps that shrink add up to a geometric series. On a torus they vary, but little in a few laps.
         ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
         to_come = min(to_come, laps.gap * ratio / (1.0 - ratio)) if ratio < 1.0 else to_come
     # Where disturbances change their sign in each lap, two of these laps return before one does.
-    merging = forced and laps.closest <= _MERGING * to_come
+    merging = forced and laps.closest <= _MERGING * merge
     if to_come > _TREND or merging:
         return False
     # Beside a continuum of motions stops may shrink for ever, and the states no longer change.
