@@ -187,6 +187,15 @@ class TestContinuation:
 
 
 class TestReuse:
+    def test_file_of_the_full_grid_is_not_replaced_by_its_own_refinement(self, full, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        target = tmp_path / "full.nc"
+        target.write_bytes(full.read_bytes())
+        for output in ([], ["-o", f"../{tmp_path.name}/full.nc"]):
+            assert cli.main(["run", "full.nc", "--refine", *output]) == 2
+            assert "full.nc: holds another sweep: sweep.refine was absent" in capsys.readouterr().err
+            assert target.read_bytes() == full.read_bytes()
+
     @pytest.mark.slow
     def test_finer_refined_sweep_takes_computed_cells_of_a_coarser_one(self, scene, refined, ds, tmp_path, stored):
         finer = AXES | {"drive.amplitude": np.geomspace(0.5, 8.0, 81)}
