@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from belts import on_belt
-from relations import Kind, random_scenes
+from relations import Kind, factor, random_scenes
 from solutions import HISTORY, solve
 
 import ringsweep
@@ -14,6 +14,7 @@ from ringsweep.models import MODELS
 from ringsweep.models.interface import audit, modes
 from ringsweep.physics import drives
 from ringsweep.quantities.flags import FAILED, JAMMED, RESTING, SEPARATING
+from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.solvers import audit as run_audit
 from ringsweep.solvers import event
 from ringsweep.solvers.certificate import TwoRuns, errors, with_errors
@@ -334,6 +335,19 @@ class TestErrors:
         added = dict(zip(with_errors(NAMES), (with_rate - without)[0], strict=True))
         assert added["omega_end"] == pytest.approx(1e-6, rel=0.5)
         assert added["phi_end"] == 0.0
+
+    def test_scale_of_times_follows_the_unit_of_time(self, cells):
+        """The contacts open at launch, so that no time of the run is a scale of the others."""
+        scene, changed = {"time.span": 1.0, "initial.phi": np.pi}, {"time": 1e6}
+        in_hours = scene | {"time.span": 1e6, "gravity": 9.81e-12}
+        first, second = (cells(values, law="stiction", drive="arctan") for values in (scene, in_hours))
+        rows = Auto().run(first, NAMES).rows
+        scales, other = (
+            np.array([factor(OUTCOMES[name].units, changed) for name in names]) for names in (NAMES, with_errors(NAMES))
+        )
+        bounds = errors(TwoRuns(first, rows, rows, NAMES), safety=1.0, share=0.0, steps=10)
+        changed = errors(TwoRuns(second, rows * scales, rows * scales, NAMES), safety=1.0, share=0.0, steps=10)
+        np.testing.assert_allclose(changed, bounds * other, rtol=1e-12)
 
     def test_error_bounds_are_linked_to_their_variables_and_absent_without_certificates(self, scene):
         axes = {"drive.amplitude": [0.1, 2.0]}

@@ -260,7 +260,7 @@ def _differences(runs: TwoRuns) -> tuple[NDArray[np.float64], NDArray[np.float64
     with np.errstate(invalid="ignore", over="ignore"):
         difference = np.abs(a - runs.second_rows[:, columns])
     units = np.array([OUTCOMES[name].units for name in names])
-    scale, own_scales = np.empty_like(a), {"s": np.minimum(1.0, runs.batch.span)} | least_scales(runs.batch)
+    scale, own_scales = np.empty_like(a), {"s": runs.batch.span} | least_scales(runs.batch)
     for unit in set(units.tolist()):
         of_unit = units == unit
         # A reaction that is infinite before a jam is no scale of the others.

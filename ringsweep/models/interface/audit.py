@@ -141,7 +141,8 @@ def least_scales(batch):
     Returns
     -------
     dict of ndarray
-        Of shape ``(cells,)``. By default there are none: the largest number of each unit is its scale.
+        Of shape ``(cells,)``. By default there are none: the largest number of each unit is its scale, and the span is
+        added to that of times.
     """
     return {}
 

@@ -106,17 +106,21 @@ def _bristle_energy(scene, forcing, y):
 # Largest rounding of an angle, rad.
 _ANGLE_ROUNDING = 1e-12
 
-# A run that ends before this time ends at its launch, s.
-_LAUNCH_TIME = 1e-13
+# A run that ends before this share of the least scale of times ends at its launch.
+_LAUNCH = 1e-13
 
 # A separation is certain if the reaction needs more time to rise again than this multiple of the error of the instant.
 _FALL_FACTOR = 5.0
 
 
 @audit.least_scales.implements(ring.Ring, ring.BristleRing)
-def least_rates(batch):
-    """The scale of an angular velocity at least, rad/s, see :func:`ringsweep.models.sliding.rate_at_rest`."""
-    return {"rad s-1": rate_at_rest(batch)}
+def rates_and_times(batch):
+    """The scales of an angular velocity, rad/s, and of a time, s, at least.
+
+    See :func:`ringsweep.models.sliding.rate_at_rest`.
+    """
+    rate = rate_at_rest(batch)
+    return {"rad s-1": rate, "s": np.minimum(1.0 / rate, batch.span)}
 
 
 @audit.is_reaction.implements(ring.Ring, ring.BristleRing)
@@ -148,7 +152,7 @@ def _is_launched_on_edge(batch):
 
 def _is_near_another_regime(batch, a, b, fall_rates):
     """Whether the difference between the outcomes `a` and `b` of two runs is large enough to change the regime."""
-    separating, moved = a.regime == SEPARATING, a.t_end > _LAUNCH_TIME
+    separating, moved = a.regime == SEPARATING, a.t_end * rate_at_rest(batch) > _LAUNCH
     found = np.zeros(len(fall_rates), dtype=bool)
     # A least reaction that is smaller than its error leaves separation open.
     body, omega_squared = batch.body, np.maximum(np.abs(a.omega_min), np.abs(a.omega_max)) ** 2

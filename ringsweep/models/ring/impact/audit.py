@@ -14,7 +14,7 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import audit
-from ringsweep.models.ring.audit import least_rates, undecided_on_contacts
+from ringsweep.models.ring.audit import rates_and_times, undecided_on_contacts
 from ringsweep.models.ring.impact.mode import (
     BOTH,
     NONE,
@@ -132,9 +132,9 @@ def _disturbed(batch):
 
 @audit.least_scales.implements(ImpactRing)
 def _least_scales(batch):
-    body, reach, rates = batch.closed.body, batch.balls.reach, least_rates(batch.closed)
-    speed = reach * (rates["rad s-1"] + np.sqrt(body.gravity / reach))
-    return rates | {"m": reach, "m s-1": speed, "N s": body.mass * speed, "J": body.mass * speed * speed}
+    body, reach, scales = batch.closed.body, batch.balls.reach, rates_and_times(batch.closed)
+    speed = reach * (scales["rad s-1"] + np.sqrt(body.gravity / reach))
+    return scales | {"m": reach, "m s-1": speed, "N s": body.mass * speed, "J": body.mass * speed * speed}
 
 
 @audit.of_events.implements(ImpactRing)
