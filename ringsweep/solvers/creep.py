@@ -414,8 +414,8 @@ def _extremes(scene, record, start, scratch, taken, views):
     on small errors of the instant. The acceleration would tell the instant worse: where friction rises steeply, it
     magnifies the error of the dense output.
 
-    `views` are those at the beginning, in the middle and at the end of the step. The number of fractions is returned, and
-    whether any of these quantities may set a record within the step, or turn.
+    `views` are those at the beginning, in the middle and at the end of the step. The number of fractions is returned,
+    and whether any of these quantities may set a record within the step, or turn.
     """
     work, row, count = scratch.work[:-1], scratch.work[-1], 0
     before, within, after = views[0][1], views[1][1], views[2][1]
