@@ -451,6 +451,9 @@ def test_init_writes_a_valid_configuration_and_replaces_no_file(folder, capsys, 
     assert "exists already" in refused(capsys, "init", "--model", model)
     assert "*.yaml" in refused(capsys, "init", "sweep.txt")
     assert "does not exist" in refused(capsys, "init", "nowhere/a.yaml")
+    with pytest.raises(SystemExit):
+        main(["init", "--help"])
+    assert re.search(rf"\b{model}:\s+a drum|\b{model}: (two balls|a mass on a spring)", capsys.readouterr().out)
 
 
 def test_help_tells_the_exit_status_and_its_examples_parse(capsys):

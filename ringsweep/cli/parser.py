@@ -32,8 +32,8 @@ def build_parser() -> argparse.ArgumentParser:
     init = _add_command(
         entries, commands.init_command, "config NEW.yaml", f"default: {first}", nargs="?", default=first
     )
-    models = ["ring", "ring-single-contact", "belt"]
-    _option(init, "--model", "what it describes (default: ring)", choices=models, default="ring")
+    models = {"ring": "two balls (default)", "ring-single-contact": "a drum", "belt": "a mass on a spring"}
+    _option(init, "--model", "; ".join(map(": ".join, models.items())), choices=list(models), default="ring")
 
     run = _add_command(entries, commands.run_command, "config CONFIG.yaml", "or OUT.nc, whose sweep is repeated")
     _option(run, "-o --output OUT.nc", "default: the configuration's name, in this folder")
