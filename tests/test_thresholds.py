@@ -139,7 +139,7 @@ class TestDistribution:
         said = capsys.readouterr().out
         assert "50% below 0.2" in said or "50% below inf" in said
         # k < 0.2 m g / (v T) = 1.962 N/m begins within: 46.2 % of the points.
-        assert "; 69 begin nowhere there" in said or "; 68 begin nowhere there" in said
+        assert "; in 69 it begins nowhere there" in said or "; in 68 it begins nowhere there" in said
 
 
 class TestInWords:

@@ -344,15 +344,15 @@ def in_words(found: xr.Dataset) -> str:
     if "quantile" in found.dims:
         values = found["threshold"].values
         counts = {
-            "begin at the first value or before": np.count_nonzero(np.isneginf(values)),
-            "begin nowhere there": np.count_nonzero(np.isposinf(values)),
-            "are not known, for lack of certified runs": np.count_nonzero(np.isnan(values)),
+            "begins at the first value or before": np.count_nonzero(np.isneginf(values)),
+            "begins nowhere there": np.count_nonzero(np.isposinf(values)),
+            "is not known, for lack of certified runs": np.count_nonzero(np.isnan(values)),
         }
         lines = [f"{regime} begins at {path}, by its probability (95 % interval):"]
         for one in told["thresholds"]:
             interval = f"({one['low']:.6g} to {one['high']:.6g})"
             lines.append(f"  {one['share']:.0%} below {one['value']:.6g}{unit} {interval}")
-        told["scan"] += "".join(f"; {count} {what}" for what, count in counts.items() if count)
+        told["scan"] += "".join(f"; in {count} it {what}" for what, count in counts.items() if count)
     else:
         lines = []
         for one in told["thresholds"]:
