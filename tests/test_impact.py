@@ -19,7 +19,7 @@ from benchmarks.hostile.kills import killed_at
 from ringsweep import cli
 from ringsweep.errors import InputError
 from ringsweep.models.ring.impact.switch import SUMMED
-from ringsweep.physics.impact import Balls, Motion, contact_of, impulses
+from ringsweep.physics.impact import Balls, Contact, Motion, contact_of, impulses
 from ringsweep.quantities.flags import AFTERMATHS, SEPARATING
 from ringsweep.quantities.variables import INFERRED, LABELS
 from ringsweep.storage import netcdf
@@ -668,6 +668,20 @@ def hit(mass, inertia, balls, motion, mu):
     found = impulses(mass, inertia, first, second, (True, True), tuple(mu), (0.0, 0.0))
     stuck = found.solutions == 1 and found[5:9] == (0.0, 0.0, 0.0, 0.0)
     return stuck, np.array([found.normal_1, found.along_1, found.normal_2, found.along_2])
+
+
+def test_impact_of_a_body_with_little_inertia_has_its_one_solution():
+    """Contact 1 holds and sticks, contact 2 hits. Changes of velocity are differences of much larger terms."""
+    held = Contact(0.0, 0.116447143940803, 0.993196890182420, 0.0, 0.0, 0.0, 0.014962529172758, 0.036275928938190)
+    hits = Contact(0.0, -0.999874276888665, 0.015856557519516, 0.0, -0.610455609, 0.675350424, -held[6], held[7])
+    mu, e = 0.398885, 0.606378
+    found = impulses(1063.62, 5.17359e-05, held, hits, (True, True), (mu, mu), (0.0, e))
+    assert found.solutions == 1
+    assert found.violation < 1e-9
+    assert (found.opening_1, found.slip_1) == (0.0, 0.0)
+    assert found.opening_2 == pytest.approx(0.610455609 * e, rel=1e-9)
+    assert found.along_2 == pytest.approx(mu * found.normal_2, rel=1e-9)
+    assert found.slip_2 < 0.0 < abs(found.along_1) < mu * found.normal_1
 
 
 def range_of_impulses(mass, inertia, balls, motion, mu):

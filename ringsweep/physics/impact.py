@@ -232,6 +232,12 @@ def _change(row, impulses):
 
 
 @inlined
+def _size(row, impulses):
+    """Sum of the sizes of the terms of such a change."""
+    return abs(row[0] * impulses[0]) + abs(row[1] * impulses[1]) + abs(row[2] * impulses[2]) + abs(row[3] * impulses[3])
+
+
+@inlined
 def _by_unknowns(row, k_1, k_2, sticks_1):
     """Change of a velocity by the normal impulses, with friction k of each, and by that of a contact that sticks."""
     return row[0] + k_1 * row[1], row[2] + k_2 * row[3], row[1] if sticks_1 else row[3]
@@ -250,6 +256,24 @@ def _solve_three(m, right):
 
 
 @inlined
+def _solved(m, right):
+    """Whether three linear equations have a solution, and the solution.
+
+    Cramer's rule is applied once more to what it leaves: of a body with little inertia it leaves more than rounding.
+    """
+    x, y, z, whole = _solve_three(m, right)
+    if whole == 0.0:
+        return False, 0.0, 0.0, 0.0
+    x, y, z = x / whole, y / whole, z / whole
+    p, q, r = m
+    left_p, left_q = right[0] - p[0] * x - p[1] * y - p[2] * z, right[1] - q[0] * x - q[1] * y - q[2] * z
+    left = left_p, left_q, right[2] - r[0] * x - r[1] * y - r[2] * z
+    more_x, more_y, more_z, _ = _solve_three(m, left)
+    x, y, z = x + more_x / whole, y + more_y / whole, z + more_z / whole
+    return abs(x) + abs(y) + abs(z) < 1e300, x, y, z
+
+
+@inlined
 def _shared_stick(mu, couplings, wanted, scale):
     """Impulses that stop both contacts, which is three conditions on four impulses: (found, N1, T1, N2, T2).
 
@@ -259,12 +283,10 @@ def _shared_stick(mu, couplings, wanted, scale):
     opening_1, slip_1, opening_2, _ = couplings
     d_1, s_1, d_2 = wanted
     matrix = opening_1[:3], slip_1[:3], opening_2[:3]
-    n_1, t_1, n_2, whole = _solve_three(matrix, (d_1, s_1, d_2))
-    if whole == 0.0:
+    found, n_1, t_1, n_2 = _solved(matrix, (d_1, s_1, d_2))
+    also, by_1, by_t, by_2 = _solved(matrix, (-opening_1[3], -slip_1[3], -opening_2[3]))
+    if not (found and also):
         return False, 0.0, 0.0, 0.0, 0.0
-    by_1, by_t, by_2, _ = _solve_three(matrix, (-opening_1[3], -slip_1[3], -opening_2[3]))
-    n_1, t_1, n_2 = n_1 / whole, t_1 / whole, n_2 / whole
-    by_1, by_t, by_2 = by_1 / whole, by_t / whole, by_2 / whole
     # Four conditions p + q z >= 0 on the impulse z along the race at contact 2.
     low, high = -1e300, 1e300
     for p, q in (
@@ -347,17 +369,15 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
                     three, right_3 = _by_unknowns(rows[1], k_1, k_2, True), -before[1]
                 elif sticks_2:
                     three, right_3 = _by_unknowns(rows[3], k_1, k_2, False), -before[3]
-                n_1, n_2, t, whole = _solve_three((one, two, three), (right_1, right_2, right_3))
-                if whole == 0.0:
-                    continue
-                n_1, n_2, t, found = n_1 / whole, n_2 / whole, t / whole, True
+                found, n_1, n_2, t = _solved((one, two, three), (right_1, right_2, right_3))
                 t_1, t_2 = t if sticks_1 else k_1 * n_1, t if sticks_2 else k_2 * n_2
-            rough = least + _CANCELLED * (unit_1 * abs(n_1) + unit_2 * abs(n_2))
+            impulse = n_1, t_1, n_2, t_2
+            terms = max(max(_size(rows[0], impulse), _size(rows[1], impulse)), _size(rows[2], impulse))
+            rough = least + _CANCELLED * max(terms, _size(rows[3], impulse))
             # Most modes need an impulse that pulls, or more friction than there is.
             short = max(unit_1 * (abs(t_1) - mu[0] * n_1), unit_2 * (abs(t_2) - mu[1] * n_2))
             if not found or min(unit_1 * n_1, unit_2 * n_2) < -rough or short > rough:
                 continue
-            impulse = n_1, t_1, n_2, t_2
             o_1, s_1 = before[0] + _change(rows[0], impulse), before[1] + _change(rows[1], impulse)
             o_2, s_2 = before[2] + _change(rows[2], impulse), before[3] + _change(rows[3], impulse)
             # The law once more, from the impulses and the velocities.
