@@ -33,7 +33,7 @@ def test_words_and_boundary_are_those_of_the_functions(ds):
     )
 
 
-def test_where_keeps_the_cells_of_classes_and_refuses_words_that_there_are_not(ds):
+def test_where_keeps_the_cells_of_classes_and_refuses_unknown_words(ds):
     lost = ds.ringsweep.where(regime="separating", certified="certified")
     inside = (ringsweep.words(ds.regime) == "separating") & (ds.certified == 1)
     xr.testing.assert_equal(lost.t_separation, ds.t_separation.where(inside))
@@ -241,7 +241,7 @@ class TestCell:
         assert found["scene"]["friction"]["law"] == "coulomb"
         assert found["scene"]["zones"][0]["mu_k"] == 0.25
 
-    def test_cell_refuses_incomplete_selections_and_datasets_without_configuration(self, maps):
+    def test_cell_refuses_incomplete_selections_and_unconfigured_datasets(self, maps):
         with pytest.raises(InputError, match=r"zone_half_angle \(4\) is left"):
             plots.cell(maps, {"drive.amplitude": 2.0})
         with pytest.raises(InputError, match="did you mean drive_amplitude"):

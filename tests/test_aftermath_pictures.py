@@ -153,7 +153,7 @@ class TestOffTheRace:
         touching["gap_2"][150] = 0.0
         np.testing.assert_array_equal(phases(touching), phase)
 
-    def test_friction_of_closed_contacts_follows_from_the_accelerations_and_open_contacts_have_none(self, run):
+    def test_closed_contacts_have_friction_by_accelerations_and_open_ones_none(self, run):
         found, _ = ring_history(run)
         # Where parts of the run meet, forces belong to one of them.
         ok = (run["time"].values % 1.0 > 0.02) & (run["time"].values % 1.0 < 0.98) & (run["omega"].values != 0.0)
@@ -162,7 +162,7 @@ class TestOffTheRace:
         assert ok.mean() > 0.9
 
     @pytest.mark.parametrize("time", [0.5, 1.5, 2.5, 3.7])
-    def test_polar_view_shows_balls_where_they_are_and_forces_at_closed_contacts_only(self, run, time):
+    def test_polar_view_has_balls_in_place_and_forces_at_closed_contacts_only(self, run, time):
         axes = ax()
         plots.polar_view(run, time, axes)
         now = run.isel(time=int(np.flatnonzero(run["time"] == time)[0]))
@@ -177,7 +177,7 @@ class TestOffTheRace:
         np.testing.assert_allclose(weight.get_offsets()[0], [now["x"], now["y"]], atol=1e-12)
         assert axes.get_title().endswith({1.5: "one contact open", 2.5: "flight"}.get(time, axes.get_title()))
 
-    def test_particle_in_flight_is_a_ball_as_far_from_the_race_as_its_gap_with_its_weight_at_its_centre(self, run):
+    def test_particle_in_flight_is_a_ball_a_gap_off_the_race_with_its_weight(self, run):
         scene = {name: SCENE[name] for name in ("ring", "friction", "zone", "drive", "impact", "time")}
         scene |= {"model": "ring-single-contact", "body": {"mass": MASS}}
         alone = run.drop_vars(["gap_2", "normal_2"]).assign_attrs(configuration=json.dumps({"scene": scene}))
@@ -205,7 +205,7 @@ class TestOffTheRace:
 
 
 class TestHistory:
-    def test_panels_below_show_gaps_and_impacts_and_all_panels_shade_open_contacts(self, run):
+    def test_panels_below_show_gaps_and_impacts_and_all_shade_open_contacts(self, run):
         figure = plots.history(run)
         gaps, impacts = figure.axes[4:6]
         assert gaps.get_ylabel() == "gap (mm)"
@@ -246,7 +246,7 @@ class TestHistory:
         assert titles.count("contact 1") == titles.count("contact 2") == 2
 
 
-def test_phase_portrait_names_pivot_flight_and_the_jumps_of_velocity_at_impacts(run):
+def test_phase_portrait_names_pivot_flight_and_velocity_jumps_at_impacts(run):
     axes = plots.phase_portrait(run, ax=ax())
     assert {"stick", "slip backward", "one contact open", "flight", "impact"} <= set(entries(axes))
     lines = [line for line in axes.lines if line.get_linewidth() == 0.6]
@@ -258,7 +258,7 @@ def test_phase_portrait_names_pivot_flight_and_the_jumps_of_velocity_at_impacts(
 
 
 class TestMaps:
-    def test_words_have_colours_that_differ_in_greyscale_and_a_map_hatches_what_is_not_certified(self):
+    def test_words_differ_in_greyscale_and_a_map_hatches_what_is_not_certified(self):
         assert tuple(AFTERMATH_COLOURS) == AFTERMATHS
         shades = [float(np.dot([0.2126, 0.7152, 0.0722], to_rgb(colour))) for colour in AFTERMATH_COLOURS.values()]
         assert (np.diff(shades) < -0.1).all()

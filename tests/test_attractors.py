@@ -171,7 +171,7 @@ class TestBranchesOfTheFrictionOscillator:
         scene = {"initial": initial, "time": {"span": 2000.0}}
         return belt(1.0, scene=scene, record={"exponent": True}, sweep=sweep)
 
-    def test_steady_slip_loses_its_stability_where_damping_and_falling_friction_cancel(self):
+    def test_steady_slip_turns_unstable_where_damping_cancels_falling_friction(self):
         """Hopf bifurcation: c = N (mu_s - mu_k) alpha exp(-alpha v), so v = ln(10) / 2."""
         velocities = np.linspace(1.1, 1.2, 11)
         ds = self.follow(velocities, "down", x=0.55, velocity=0.0)

@@ -81,7 +81,7 @@ class TestCoulomb:
         assert float(found.period) == pytest.approx(2 * pi / sqrt(2.0), rel=1e-10)
         assert float(found.x_max) == pytest.approx(0.4905 + 0.1 / sqrt(2.0), rel=1e-10)
 
-    def test_oscillation_on_a_belt_at_rest_decays_by_a_constant_amount_and_ends_at_rest(self):
+    def test_oscillation_on_a_belt_at_rest_decays_by_equal_steps_to_rest(self):
         """The amplitude falls by 4 F_c/k in each cycle."""
         scene = belt("coulomb", v_b=0.0, k=1.0, mu_k=0.4 / G, span=30.0) | {"initial": {"x": 3.0, "velocity": 0.0}}
         run, found = ringsweep.simulate(scene), outcome(scene)
@@ -152,7 +152,7 @@ class TestKarnopp:
     """Within the dead band D_v the body does not slide; it keeps its momentum, and slides on with it."""
 
     @pytest.mark.parametrize("dead_band", [1e-6, 1e-3, 0.02])
-    def test_karnopp_cycle_is_carried_at_the_speed_of_the_belt_and_slips_from_the_edge_of_the_band(self, dead_band):
+    def test_karnopp_cycle_rides_with_the_belt_and_slips_from_the_band_edge(self, dead_band):
         found = outcome(belt("karnopp", dead_band=dead_band, span=100.0, start=0.1 - dead_band))
         v, drop, omega = 0.1 - dead_band, 0.05 * G, sqrt(2.0)
         expected = drop / 0.1 + 2 / omega * (pi - atan(drop * omega / (2 * v)))
@@ -165,13 +165,13 @@ class TestKarnopp:
         # Until then the belt carries it at 0.1 m/s, and the excess of the spring's pull is its momentum.
         assert float(found.first_slip) == pytest.approx(7.3575 + sqrt(dead_band / 0.1), rel=1e-10)
 
-    def test_shift_of_time_is_a_multiplier_of_one_although_the_velocity_jumps_at_the_band(self):
+    def test_shift_of_time_is_a_multiplier_of_one_despite_a_jump_of_velocity(self):
         scene = belt("karnopp", dead_band=0.01, span=200.0, start=0.09)
         found = ringsweep.run({"scene": scene, "record": {"exponent": True}}, progress=False)
         assert found.multiplier_1.item() == pytest.approx(1.0, abs=1e-9)
         assert found.multiplier_2.item() == 0.0
 
-    def test_body_that_leaves_the_band_where_friction_does_not_fall_swings_about_the_balance(self):
+    def test_body_leaving_the_band_at_equal_friction_swings_about_the_balance(self):
         """Its momentum is that of the edge, and no force accelerates it there. Runs of such scenes had failed."""
         found = outcome(belt("karnopp", mu_s=0.1, mu_k=0.1, dead_band=0.01, span=60.0, start=0.09))
         assert found.certified == 1
@@ -218,7 +218,7 @@ class TestLimits:
         np.testing.assert_allclose(slopes, 1.0, atol=0.01)
 
     @pytest.mark.slow
-    def test_piecewise_cubic_tends_to_stiction_with_the_power_two_thirds_of_the_width(self):
+    def test_piecewise_cubic_tends_to_stiction_with_width_to_the_two_thirds(self):
         """The law is flat at its top: the passage over such a fold takes a time proportional to the power 2/3."""
         slopes = exponent("piecewise-cubic", {"v0": 1, "v1": 2}, [1e-4, 1e-5, 1e-6], "stiction", "x_max")
         np.testing.assert_allclose(slopes, 2 / 3, atol=0.02)
@@ -240,7 +240,7 @@ class TestLimits:
         slopes = exponent("reset-integrator", {"sigma0": 1}, [1e4, 1e5, 1e6], "stiction", "period", sigma1=300.0)
         np.testing.assert_allclose(slopes, -1.0, atol=0.01)
 
-    def test_lugre_with_stiff_bristles_tends_to_stiction_with_the_power_two_thirds_of_v_s(self):
+    def test_stiff_lugre_tends_to_stiction_with_v_s_to_the_two_thirds(self):
         """The top of the Stribeck curve is a fold too."""
         fixed = {"sigma0": 1e9, "sigma1": 300.0}
         slopes = exponent("lugre", {"v_s": 1}, [3e-3, 1e-3, 3e-4], "stiction", "x_max", **fixed)

@@ -254,7 +254,7 @@ def branch(frequency, x, velocity, spans):
         ((0.20907563025210085, 0.1476761406794336, -0.4227321490531239), 1.0),
     ],
 )
-def test_motion_that_slowly_leaves_an_unstable_one_is_transient_until_it_has_found_its_period(start, laps):
+def test_slow_escape_from_an_unstable_motion_is_transient_until_periodic(start, laps):
     """Its exponent is positive for hundreds of periods, with a tiny scatter: the motion beside it is unstable.
 
     In the last case each cycle turns a disturbance round, and takes a hundredth of it: long before the motion returns

@@ -128,14 +128,14 @@ class TestFrictionLoop:
         assert ax.get_xlabel() == "sliding velocity (m s$^{-1}$)"
         assert ax.get_ylabel() == "friction force (N)"
 
-    def test_inset_shows_the_loop_of_bristles_near_zero_and_a_law_without_memory_has_none(self, run, lugre, ax):
+    def test_inset_shows_the_loop_of_bristles_and_is_absent_without_memory(self, run, lugre, ax):
         plots.friction_loop(lugre, ax=ax)
         (inset,) = ax.child_axes
         assert inset.get_xlim()[1] == pytest.approx(0.02 * np.abs(lugre.velocity - lugre.belt_velocity).max())
         assert inset.get_ylim() == ax.get_ylim()
         assert not plots.friction_loop(run, ax=Figure().add_subplot()).child_axes
 
-    def test_bristles_give_another_force_at_breakaway_than_at_the_return_to_stick(self, lugre, ax):
+    def test_bristles_give_another_force_at_breakaway_than_at_return_to_stick(self, lugre, ax):
         plots.friction_loop(lugre.sel(time=slice(5.0, 12.0)), ax=ax)
         points = drawn(ax)
         near = points[np.abs(points[:, 0] + 2e-3) < 1e-3]
@@ -143,7 +143,7 @@ class TestFrictionLoop:
         assert np.ptp(near[:, 1]) > 0.01 * LOAD
 
     @pytest.mark.parametrize("name", ["run", "lugre"])
-    def test_area_under_the_force_over_the_distance_is_the_energy_that_friction_takes(self, name, request, ax):
+    def test_area_under_force_over_distance_is_the_energy_that_friction_takes(self, name, request, ax):
         run = request.getfixturevalue(name).sel(time=slice(5.0, 19.0))
         plots.friction_loop(run, "distance", ax)
         area = 0.0

@@ -52,7 +52,7 @@ class TestSticking:
         ("law", "of_law"),
         mostly_slow([("stiction", {}), ("bengisu-akay", {"v0": 1e-4, "alpha": 1e4})], [("stiction", {})]),
     )
-    def test_body_on_a_belt_at_rest_comes_to_stick_and_on_a_moving_belt_slips_again(self, law, of_law):
+    def test_body_comes_to_stick_on_a_resting_belt_and_slips_on_a_moving_one(self, law, of_law):
         of = scene(law, mu_s=0.15, mu_k=0.1, belt=0.0, x=2.0, velocity=0.0, **of_law)
         found = ringsweep.sweep(of, {"belt.velocity": [0.0, 1e-3, -1e-3]}, progress=False)
         assert words(found) == ["sticking", "stick-slip", "stick-slip"]
@@ -255,7 +255,7 @@ def test_cubic_spring_alone_pulls_a_stuck_body_loose_again_and_again():
 
 
 @pytest.mark.slow
-def test_body_that_slides_steadily_below_the_end_of_the_stiction_band_is_sliding():
+def test_body_sliding_steadily_below_the_stiction_band_end_is_sliding():
     """Friction that grows with the speed cannot cause stick-slip."""
     friction = {"law": "bengisu-akay", "mu_s": 0.1, "mu_k": 0.1, "v0": 1.0, "alpha": 10.0}
     of = with_all_parts(oscillator(friction, belt={"velocity": 0.2}))
@@ -279,7 +279,7 @@ class TestSteadySliding:
             assert trusted.any()
             np.testing.assert_array_equal(words_of(loose)[trusted], words_of(tight)[trusted])
 
-    def test_fast_oscillation_that_decays_within_the_span_is_sliding_and_not_settled_at_first(self):
+    def test_fast_decaying_oscillation_is_sliding_and_not_settled_at_first(self):
         stiff = with_all_parts({**self.SCENE, "spring": {"stiffness": 1e7}, "damper": {"coefficient": 14.3}})
         found = runs(stiff, [2.0, 30.0])
         assert words(found) == ["sliding", "sliding"]

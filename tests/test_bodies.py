@@ -249,7 +249,7 @@ class TestLastBalance:
         with pytest.raises(ValueError, match=message):
             ring.completed(AboutCentre(*self.RIG, ()))
 
-    def test_friction_of_a_contact_that_only_the_other_one_loads_is_checked_too(self):
+    def test_friction_of_a_contact_that_only_the_other_loads_is_checked_too(self):
         balances = "N1 = onto_1*K2*N2", "N2 = mass*press", "mass*radius*phi_dd = 2*K1*N1 + K2*N2 - mass*pull*sin_phi"
         ring.body(balances=balances, energy=ENERGY)(Brake)
         with pytest.raises(ValueError, match=r"K1\*N1 or K2\*N2 does not do the work of friction"):

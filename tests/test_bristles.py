@@ -204,7 +204,7 @@ class TestHysteresis:
         assert again == pytest.approx(low, rel=1e-6)
         assert work == pytest.approx(4 * MU_K**2 / SIGMA_0 * (u - tanh(u)), rel=1e-4)
 
-    def test_area_of_dahls_loop_is_cubic_for_small_and_coulombs_for_large_amplitudes(self):
+    def test_dahls_loop_has_a_cubic_area_if_small_and_coulombs_area_if_large(self):
         small, smaller = (self.area(u * MU_K / SIGMA_0)[0] for u in (0.04, 0.02))
         assert log(small / smaller) / log(2) == pytest.approx(3.0, abs=0.01)
         large = 200 * MU_K / SIGMA_0

@@ -142,12 +142,12 @@ class TestLaunch:
         assert self.bristles(batch) == (0.0, 0.0)
 
     @pytest.mark.parametrize("rounding", [-3e-16, 0.0, 3e-16])
-    def test_bristles_of_a_body_launched_at_the_velocity_of_the_ring_are_not_deflected(self, cells, rounding):
+    def test_bristles_of_a_body_launched_at_ring_velocity_are_not_deflected(self, cells, rounding):
         speed = 0.3 * 2 * np.pi * 1.7 * np.cos(0.4)
         rocking = {"drive.frequency": 1.7, "drive.phase": 0.4, "initial.omega": speed * (1.0 + rounding)}
         assert self.bristles(cells(self.LUGRE | rocking, law="lugre", drive="sinusoidal")) == (0.0, 0.0)
 
-    def test_bristles_of_a_body_at_rest_on_a_ring_at_its_reversal_are_not_deflected(self, cells):
+    def test_bristles_of_a_body_at_rest_on_a_reversing_ring_are_not_deflected(self, cells):
         """The velocity of the ring there is the rounding error of a cosine."""
         rocking = {"drive.frequency": 0.9, "drive.phase": np.pi / 2}
         assert self.bristles(cells(self.LUGRE | rocking, law="lugre", drive="sinusoidal")) == (0.0, 0.0)
@@ -159,7 +159,7 @@ class TestLaunch:
             _, (_, v), _, _ = modes.begin(scene)
             assert (v < 0.0) == (exponent < 2.0)
 
-    def test_body_lags_from_the_first_instant_under_infinite_initial_acceleration(self, cells):
+    def test_body_lags_from_the_first_instant_under_infinite_acceleration(self, cells):
         """No friction gives this acceleration. The body lags even if its lag is below the tolerance."""
         rng = np.random.default_rng(5)
         count = 60
@@ -349,7 +349,7 @@ class TestErrors:
         changed = errors(TwoRuns(second, rows * scales, rows * scales, NAMES), safety=1.0, share=0.0, steps=10)
         np.testing.assert_allclose(changed, bounds * other, rtol=1e-12)
 
-    def test_error_bounds_are_linked_to_their_variables_and_absent_without_certificates(self, scene):
+    def test_error_bounds_link_to_variables_and_are_absent_if_uncertified(self, scene):
         axes = {"drive.amplitude": [0.1, 2.0]}
         found = ringsweep.sweep(scene, axes)
         assert found.phi_end.attrs["ancillary_variables"] == "phi_end_error"
@@ -402,7 +402,7 @@ class TestChaos:
 
 
 @pytest.mark.slow
-def test_greatest_velocity_of_a_body_that_rides_on_a_belt_is_that_of_the_belt():
+def test_greatest_velocity_of_a_body_riding_on_a_belt_is_that_of_the_belt():
     scene = on_belt({"law": "stiction", "mu_s": 0.9, "mu_k": 0.8}, cubic=0.0, span=5.0) | {
         "initial": {"velocity": float(0.1 * 2.0 * np.pi * 0.7 * np.cos(1.0))},
         "drive": {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.7, "phase": 1.0},

@@ -218,7 +218,7 @@ def test_control_characters_of_a_file_and_of_a_name_are_escaped(folder, capsys):
 
 
 @pytest.mark.slow
-def test_warning_of_a_library_is_a_line_of_the_log_with_control_characters_escaped(folder, capsys):
+def test_library_warning_is_a_log_line_with_control_characters_escaped(folder, capsys):
     """Matplotlib quotes what it cannot draw. Python would print the escape sequence, and a line of code."""
     assert main(["run", "case.yaml", "-o", "out.nc"]) == 0
     with netcdf.open_dataset("out.nc") as result:
@@ -263,7 +263,7 @@ def test_run_takes_values_from_the_command_line(folder):
 
 
 @pytest.mark.slow
-def test_plot_draws_what_simulate_and_precision_wrote_and_names_the_command_for_sweeps(folder, capsys, caplog):
+def test_plot_draws_runs_and_precision_and_names_the_command_for_sweeps(folder, capsys, caplog):
     assert main(["simulate", "case.yaml"]) == 0
     assert "not certified" in capsys.readouterr().out.splitlines()[0]
     assert "limit of stability of rk4" in caplog.text

@@ -279,7 +279,7 @@ class TestPicture:
             said = axes.get_title(loc="right") or axes.get_title(loc="left")
             assert "axis clipped; values from \N{MINUS SIGN}3" in said
 
-    def test_last_panel_shows_the_first_breakaway_of_each_law_at_the_same_place(self, compared):
+    def test_last_panel_shows_the_first_breakaway_of_each_law_at_one_place(self, compared):
         detail = plots.history(compared).axes[-1]
         for law, line in zip(LAWS, detail.lines, strict=True):
             time, force = line.get_xydata().T

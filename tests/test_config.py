@@ -112,7 +112,7 @@ def refusal(call, *arguments, **options):
     return caught.value
 
 
-def test_example_is_read_in_si_units_and_its_source_is_json_that_reads_the_same(write):
+def test_example_is_read_in_si_units_and_its_json_source_reads_the_same(write):
     config = load(write(TEXT))
     assert config.name == "case"
     expected = {"body.inertia": 4.47e-5, "ring.radius": 0.043378, "zone.half_angle": math.radians(15), "gravity": 9.81}
@@ -328,7 +328,7 @@ def test_only_regular_files_of_a_bounded_size_are_read(tmp_path, kind, table):
 
 
 class TestLimits:
-    def test_shared_lists_count_as_often_as_they_occur_but_not_within_themselves(self):
+    def test_shared_lists_count_as_often_as_they_occur_but_not_in_themselves(self):
         shared = [0.0] * 1000
         for _ in range(2):
             shared = [shared] * 1000
@@ -639,7 +639,7 @@ def test_points_share_one_dimension_and_combine_with_a_grid(write):
     assert (error.file, error.line, error.path) == (str(file), 3, "sweep.points.ring.radius.1")
 
 
-def test_paths_with_commas_between_them_vary_together_along_the_dimension_of_the_first():
+def test_comma_joined_paths_vary_together_along_the_dimension_of_the_first():
     arcs = [{"center": centre, "half_angle": "10 deg", "mu_s": 0.5, "mu_k": 0.3} for centre in (0.0, 3.0)]
     scene = {name: part for name, part in SCENE.items() if name != "zone"} | {"zones": arcs}
     scene["friction"] = {name: value for name, value in SCENE["friction"].items() if name != "rough"}
@@ -887,7 +887,7 @@ def test_table_whose_curve_overflows_is_refused_with_its_row(section, table, pat
     assert error.path == path
 
 
-def test_beginning_of_a_name_means_the_shortest_name_that_all_others_continue():
+def test_beginning_of_a_name_means_the_shortest_that_all_others_continue():
     assert nearest_name("t_sep", ["t_end", "t_separation", "t_separation_error"]) == "t_separation"
     assert nearest_name("phi_e", ["t_end", "phi_end_error", "phi_end"]) == "phi_end"
 

@@ -220,7 +220,7 @@ class TestSliding:
         # The determinant of two of the balances is no criterion.
         assert below > 10
 
-    def test_slow_body_without_friction_at_the_top_loses_both_contacts_and_fast_body_none(self):
+    def test_frictionless_body_loses_both_contacts_at_the_top_only_if_slow(self):
         body = rod(0.076, 4.47e-5, 0.043378, 0.022, 0.75, np.sqrt(1 - 0.75**2), 9.81)
         modes = [contact.sliding(body, 0.0, 0.0, (sin(3.1), cos(3.1), omega)) for omega in (0.0, 50.0)]
         assert modes == [OPEN_BOTH, CLOSED]

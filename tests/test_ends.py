@@ -135,7 +135,7 @@ class TestLaunchOnIce:
             assert (found.separating_contact[negative == contact] == contact).all()
             assert (negative == contact).any()
 
-    def test_body_passes_through_rest_where_ring_and_body_are_equally_fast_for_an_instant(self):
+    def test_body_passes_through_rest_where_the_ring_is_briefly_as_fast(self):
         """At phi = 0 neither accelerates at launch; then the ring slows down, and the body does so by its weight."""
         found = sweep(self.ICE, {"initial.phi": [0.0]})
         assert ringsweep.words(found.regime) == ["oscillatory"]

@@ -161,9 +161,7 @@ class TestProgress:
         ringsweep.sweep(scene, {"drive.amplitude": [1.0]})
         assert capfd.readouterr().err == ""
 
-    def test_long_sweep_without_a_terminal_tells_how_far_it_is_after_a_minute_and_then_seldom(
-        self, monkeypatch, caplog
-    ):
+    def test_sweep_without_terminal_reports_after_a_minute_and_then_seldom(self, monkeypatch, caplog):
         now = [0.0]
         monkeypatch.setattr("tqdm.std.time", lambda: now[0])
         with caplog.at_level("INFO", "ringsweep"), executors.progress_bar(60, True) as bar:

@@ -138,7 +138,7 @@ class TestStick:
         np.testing.assert_allclose(run.omega[stuck], run.ring_omega[stuck], rtol=1e-8)
         np.testing.assert_allclose(run.epsilon[stuck], 2 / (1 + run.t[stuck] ** 2), rtol=1e-7)
 
-    def test_friction_in_stick_stays_within_its_bounds_and_reaches_one_at_the_end(self, run):
+    def test_friction_in_stick_stays_in_its_bounds_and_reaches_one_at_the_end(self, run):
         scene, run = run
         body = scene.body
         needed = (

@@ -15,7 +15,7 @@ def told(run, kind):
 
 
 class TestEvents:
-    def test_body_on_a_belt_breaks_loose_at_the_static_friction_and_stops_at_the_mirror_of_that_place(self):
+    def test_body_slips_at_static_friction_and_stops_at_the_mirrored_place(self):
         """The slip is a circle about mu_k m g / k, so that it ends as far below this centre as it began above it."""
         run = ringsweep.simulate(BELT)
         assert told(run, "breakaway")[0] == pytest.approx(0.15 * 9.81 / 2.0 / 0.1, rel=1e-12)
@@ -24,7 +24,7 @@ class TestEvents:
         np.testing.assert_allclose(places, 2 * 0.1 * 9.81 / 2.0 - 0.15 * 9.81 / 2.0, rtol=1e-6)
         assert len(run.event_time) == 2 * len(stops) == 2 * int(run.slips)
 
-    def test_edges_are_where_a_contact_meets_the_end_of_the_zone_and_the_last_event_is_the_separation(self, scene):
+    def test_edges_are_where_a_contact_meets_a_zone_end_and_separation_is_last(self, scene):
         run = ringsweep.simulate(scene)
         beta, half = np.arcsin(0.025 / 0.033378), np.radians(15.0)
         kinds, contacts = ringsweep.words(run.event_kind).values, run.event_contact.values

@@ -217,7 +217,7 @@ def test_a_steep_smooth_law_has_the_multipliers_of_the_law_that_jumps():
 
 
 @pytest.mark.slow
-def test_friction_that_falls_within_a_micrometre_a_second_has_the_exponent_of_neighbouring_runs():
+def test_friction_that_falls_steeply_has_the_exponent_of_neighbouring_runs():
     """A step through the fall of friction holds many times in which a disturbance grows by a factor of e."""
     scene = on_belt(
         {"law": "tustin", "mu_s": 0.208922, "mu_k": 0.0993472, "alpha": 1e6},

@@ -328,7 +328,7 @@ def test_incomplete_file_is_refused_in_one_line_that_names_what_is_missing(tmp_p
 
 
 @pytest.mark.slow
-def test_branch_that_rk4_does_not_compile_is_told_in_one_line_by_file_and_line_with_the_cure(tmp_path):
+def test_branch_that_rk4_cannot_compile_is_told_by_file_line_and_cure(tmp_path):
     old = "    rest = 1.0 - share * z\n"
     new = old + "    if z > 0.0:\n        rest = 0.0 * rest\n"
     script = """
@@ -399,7 +399,7 @@ def test_files_moved_into_the_package_register_what_they_hold(tmp_path):
 
 
 @pytest.mark.slow
-def test_law_of_an_imported_file_is_refused_by_runs_since_edits_of_it_would_go_unnoticed(tmp_path):
+def test_law_of_an_imported_file_is_refused_since_edits_would_go_unnoticed(tmp_path):
     """The key of the cache of compiled code covers the package and the files of RINGSWEEP_LAWS."""
     (path,) = (path for path in files_in(tmp_path) if path.name == "my_dahl.py")
     script = f"""

@@ -108,7 +108,7 @@ class TestForce:
             assert max(of_belt(run).values()) <= 3.0
 
     @pytest.mark.parametrize("law", mostly_slow(("bengisu-akay", "andersson"), ("bengisu-akay",)))
-    def test_greatest_force_of_a_smooth_law_is_at_the_speed_of_its_greatest_friction(self, law):
+    def test_force_of_a_smooth_law_is_greatest_at_the_speed_of_most_friction(self, law):
         force = {"amplitude": 8.0, "frequency": 0.2}
         run = ringsweep.sweep(belt(law, force=force), {"time.span": [20.0]}, progress=False).isel(time_span=0)
         v = np.linspace(0.0, 0.2, 200_001)

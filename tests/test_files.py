@@ -54,7 +54,7 @@ def assert_untouched(folder):
 
 
 class TestForeignFolder:
-    def test_link_in_place_of_the_folder_is_refused_and_its_target_is_untouched(self, config, precious, capsys):
+    def test_link_in_place_of_the_folder_is_refused_and_its_target_stays(self, config, precious, capsys):
         target = config.with_name("out.nc")
         target.with_name("out.nc.partial").symlink_to(precious)
         for fresh in ([], ["--fresh"]):
@@ -310,7 +310,7 @@ def test_name_with_control_characters_is_refused_and_shown_escaped():
     assert str(refused.value) == r"red\x1b[31m\nx.nc: the name has control characters: choose another one"
 
 
-def test_umask_that_forbids_to_read_what_is_written_is_told_and_leaves_nothing(tmp_path):
+def test_umask_that_forbids_reading_the_output_is_told_and_leaves_nothing(tmp_path):
     before = os.umask(0o777)
     try:
         with (

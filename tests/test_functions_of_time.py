@@ -159,7 +159,7 @@ class TestDerived:
         assert drives.without_shape(cells.drive).amplitude.tolist() == [-2.0, -4.0, -6.0, -2.0]
 
     @pytest.mark.slow
-    def test_examples_of_the_documentation_run_and_their_parameters_can_be_swept(self):
+    def test_documented_examples_run_and_their_parameters_can_be_swept(self):
         assert len(EXAMPLES) == 3
         for drive in EXAMPLES:
             name = list(drive)[-1]
@@ -209,7 +209,7 @@ class TestSwitches:
         assert run.certified == 1
         assert run.phi_max > 1e-3
 
-    def test_min_and_max_are_switches_at_the_time_where_their_arguments_are_equal(self):
+    def test_min_and_max_switch_at_the_time_where_their_arguments_are_equal(self):
         ramp = take(drive_of(by(RUN_UP, a=3.0, t1=0.7)), 0)
         same = take(drive_of(by("a*min(t, t1)**2/2 + a*t1*max(t - t1, 0)", a=3.0, t1=0.7)), 0)
         mirrored = take(drive_of(by("a*t1*max(0, t - t1) - a*max(-t, -t1)*min(t1, t)/2", a=3.0, t1=0.7)), 0)

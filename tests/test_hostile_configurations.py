@@ -10,7 +10,7 @@ from ringsweep import cli
 
 
 @pytest.mark.slow
-def test_random_configurations_are_refused_in_one_line_or_run_to_finite_numbers(tmp_path):
+def test_random_configurations_are_refused_in_one_line_or_stay_finite(tmp_path):
     report = hostile.configurations(tmp_path, 50, SEED, hostile.COMMON)
     assert not report.broken
     assert report.counts["run: all cells have a regime"] > 10

@@ -75,7 +75,7 @@ def power_of_friction(run):
 
 @pytest.mark.slow
 class TestParticle:
-    def test_particle_that_leaves_smoothly_lands_at_minus_three_times_the_angle(self):
+    def test_particle_leaving_smoothly_lands_at_minus_three_times_the_angle(self):
         """It leaves at phi and lands 4 sqrt(R/g) sin(d) sqrt(cos d) later, with d = pi - |phi|, at -3 phi."""
         launches = np.linspace(10.5, 15.0, 20)
         found = ringsweep.sweep(PARTICLE, {"initial.omega": launches}, progress=False)
@@ -97,7 +97,7 @@ class TestParticle:
         assert landed >= 5
 
     @pytest.mark.parametrize("e", [0.0, 0.5, 0.9])
-    def test_unending_rebounds_at_the_lowest_point_end_when_their_geometric_sum_says(self, e):
+    def test_unending_rebounds_at_the_lowest_point_end_at_their_geometric_sum(self, e):
         """A particle at rest at the highest point falls on the lowest one, and each rebound lasts e times the last."""
         falls, lands_at = 2.0 * sqrt(RADIUS / G), 2.0 * sqrt(G * RADIUS)
         ends = falls * (1 + e) / (1 - e)
@@ -141,7 +141,7 @@ ROCKER = (
 
 class TestBody:
     @pytest.mark.slow
-    def test_body_that_rocks_in_ever_smaller_hops_comes_to_rest_on_both_contacts(self):
+    def test_body_rocking_in_ever_smaller_hops_comes_to_rest_on_both_contacts(self):
         """Moreau's time stepping, which has no events, gives this angle and rest after 0.0131 s (steps of 5e-7 s)."""
         run = ringsweep.sweep(ROCKER, {"time.span": [0.02]}, solver="auto", progress=False).squeeze()
         assert ringsweep.words(run.aftermath).item() == "recovered"
@@ -225,7 +225,7 @@ class TestBody:
             assert reaction.min() > -1e-12
             assert (reaction[gap > 1e-9] == 0.0).all()
 
-    def test_what_a_body_loses_is_the_work_of_friction_and_the_loss_in_its_impacts(self):
+    def test_body_loses_the_work_of_friction_and_the_loss_in_its_impacts(self):
         """Over a whole run in a ring at rest, with pivots, flights and a tumble."""
         run = ringsweep.simulate(AT_REST | {"initial": {"omega": LAUNCHES[4]}}, samples=20_000)
         assert ringsweep.words(run.aftermath).item() == "tumbled"
@@ -326,7 +326,7 @@ class TestBody:
         assert found.t_recovered.item() == pytest.approx(1.106471579, abs=1e-5)
         assert found.phi_end.item() == pytest.approx(-3.365267361, rel=1e-6)
 
-    def test_body_has_tumbled_once_a_contact_hits_beside_the_other_one_even_if_it_rebounds(self):
+    def test_hit_beside_the_other_contact_is_a_tumble_even_if_it_rebounds(self):
         """A body on compliant contacts, ``benchmarks.reference.rattling``, lies on both of them soon afterwards."""
         scene = (
             BODY
@@ -342,7 +342,7 @@ class TestBody:
         assert np.isnan(found.t_recovered.values).all()
 
     @pytest.mark.slow
-    def test_reaction_that_changes_its_sign_through_infinity_jams_and_opens_no_contact(self):
+    def test_reaction_with_a_sign_change_at_infinity_jams_and_opens_no_contact(self):
         """The body pivots on a contact that would enter the race if it opened. The time is that of the reference."""
         scene = (
             shape(0.475957, 4.73961e-06, 0.00424212, 0.0128909, 0.0420561, zone=(2.70773, pi))
@@ -353,7 +353,7 @@ class TestBody:
         assert found.t_end.item() == pytest.approx(0.24783247, abs=1e-7)
 
     @pytest.mark.slow
-    def test_rising_friction_takes_a_body_along_on_one_contact_and_is_no_certified_jam(self):
+    def test_rising_friction_takes_a_body_along_and_is_no_certified_jam(self):
         """The ring passes a bump of friction, on which contact 2 is lost and contact 1 comes near to a jam.
 
         The greater the acceleration of the ring, the nearer, but the body turns alike. Under an infinite acceleration
@@ -409,7 +409,7 @@ class TestBody:
         assert ringsweep.words(found.aftermath).item() == "tumbled"
         assert found.phi_end.item() == pytest.approx(-3.1472056528869796, rel=1e-9)
 
-    def test_wedged_body_that_rebounds_from_both_contacts_in_turn_comes_to_rest_on_both(self):
+    def test_wedged_body_that_rebounds_from_each_contact_in_turn_rests_on_both(self):
         """Friction forbids that one contact rebounds while the other one rests, which has just been summed.
 
         The instants are those of flights and impacts in 60 digits, or of ``benchmarks.reference``.
@@ -483,7 +483,7 @@ class TestBody:
         assert found.phi_end.item() == pytest.approx(phi_end, abs=1e-6)
 
     @pytest.mark.slow
-    def test_contact_that_opens_where_friction_jumps_at_a_speed_opens_by_its_acceleration(self):
+    def test_contact_opens_by_its_acceleration_where_friction_jumps_at_a_speed(self):
         """The gap grows like t^2. The numbers are those of the free body, integrated by SciPy with its own balances."""
         scene = (
             JUMPING
@@ -509,7 +509,7 @@ class TestBody:
         assert found.omega_end.item() == pytest.approx(-1.16804 / 0.0645043, rel=1e-12)
 
     @pytest.mark.slow
-    def test_body_that_is_wedged_on_one_contact_turns_faster_than_the_ring_that_jerks_it(self):
+    def test_body_wedged_on_one_contact_turns_faster_than_the_jerking_ring(self):
         """It has been at rest, and all accelerations are in proportion to that of the ring.
 
         With u outwards and w along the race from the ball that sticks to the centre of mass, the balances of momentum
@@ -553,7 +553,7 @@ class TestBody:
         assert found.impulse_max.item() == pytest.approx(146.67072, rel=1e-5)
 
     @pytest.mark.slow
-    def test_contact_that_is_lost_where_no_mode_can_follow_jams_the_body_and_does_not_let_it_fly(self):
+    def test_contact_lost_where_no_mode_follows_jams_the_body_without_flight(self):
         """Contact 2 alone has A_22 < 0 and no load, and without both contacts the gap of contact 1 would close."""
         friction = {
             "law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
@@ -819,7 +819,7 @@ class TestSweep:
             assert run[:-1][edge].all()
 
     @pytest.mark.slow
-    def test_computed_cells_of_a_refined_map_are_those_of_the_full_grid_bit_for_bit(self, refined_map, full_map):
+    def test_computed_cells_of_a_refined_map_equal_the_full_grid_bit_for_bit(self, refined_map, full_map):
         ds = netcdf.load(refined_map)
         run = ds.origin.values != INFERRED
         for name in full_map.data_vars:

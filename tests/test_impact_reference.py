@@ -44,7 +44,7 @@ def until(scene, t):
     return go_on(scene | {"time": {"span": float(t)}})[0]
 
 
-def test_a_particle_lands_at_minus_three_times_the_angle_at_which_it_leaves():
+def test_particle_lands_at_minus_three_times_the_angle_at_which_it_leaves():
     rng = np.random.default_rng(5)
     for _ in range(20):
         radius = rng.uniform(0.03, 0.2)
@@ -83,7 +83,7 @@ IN_TURN = [
 
 
 @pytest.mark.parametrize("numbers", IN_TURN)
-def test_body_that_rebounds_from_both_contacts_in_turn_comes_to_rest_on_both(numbers):
+def test_body_that_rebounds_from_each_contact_in_turn_rests_on_both(numbers):
     mass, inertia, half, ball, radius, mu_s, mu_k, phi, omega, e, rests = numbers
     scene = (
         rig(e=e)
@@ -98,7 +98,7 @@ def test_body_that_rebounds_from_both_contacts_in_turn_comes_to_rest_on_both(num
 
 
 @pytest.mark.parametrize("ring_omega", [0.0, 1.0, 100.0])
-def test_slow_impact_that_wedges_the_body_has_one_solution_on_a_fast_race_too(ring_omega):
+def test_slow_impact_that_wedges_has_one_solution_on_a_fast_race_too(ring_omega):
     p, q, rng = problem(rig(mu=1.5)), np.zeros(6), np.random.default_rng(1)
     touching, hits = np.array([True, True]), 0
     while hits < 50:
@@ -162,7 +162,7 @@ def test_rising_friction_takes_a_body_along_on_one_contact_before_it_jams(accele
     assert found["speed"] == pytest.approx(0.75311, abs=1e-4)
 
 
-def test_body_that_is_wedged_on_one_contact_turns_as_its_accelerations_leave_it():
+def test_body_wedged_on_one_contact_turns_as_its_accelerations_leave_it():
     """From rest, its angular velocity is to that of the ring as the accelerations of a body whose contact sticks."""
     mass, moment, half, ball, radius = 0.277488, 1.55222e-05, 0.0108799, 0.0174689, 0.0466026
     scene = (
@@ -252,7 +252,7 @@ def test_a_contact_opens_where_it_breaks_away_into_a_slip_that_runs_away():
 
 
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
-def test_a_damper_of_the_second_opinion_returns_the_restitution_whatever_mass_and_stiffness(e):
+def test_damper_returns_the_restitution_whatever_the_mass_and_stiffness(e):
     s = rattling.damping(e)
     for mass, k, v in ((0.1, 1e6, 1.0), (3.0, 2e7, 0.01)):
 
@@ -268,7 +268,7 @@ def test_a_damper_of_the_second_opinion_returns_the_restitution_whatever_mass_an
         assert run.y[1, -1] == pytest.approx(-e * v, rel=1e-6)
 
 
-def test_an_impact_of_any_body_obeys_its_law_and_gains_no_energy_if_it_is_plastic():
+def test_any_impact_obeys_its_law_and_gains_no_energy_if_it_is_plastic():
     rng = np.random.default_rng(2)
     solved = 0
     for _ in range(300):
@@ -340,7 +340,7 @@ def peck(q, u, span, dt):
     return np.array(times)
 
 
-def test_the_sleeve_of_the_woodpecker_jams_at_the_published_angle_and_friction():
+def test_sleeve_of_the_woodpecker_jams_at_published_angle_and_friction():
     # The lower edge touches, the bird hangs on the spring, and friction carries all.
     tilt = -(R_M - R_0) / H_M
     angle = tilt - M_S * G * L_G / C_PHI
@@ -364,7 +364,7 @@ SHARED = (
 )
 
 
-def test_springs_that_hit_a_little_later_part_only_in_the_impact_that_both_contacts_share():
+def test_springs_that_hit_later_part_only_in_the_impact_of_both_contacts():
     """Springs come closer to the rigid body with their stiffness up to 0.595 s, and to another motion after it."""
     _, log = go_on(SHARED, keep=MOST_EVENTS)
     asked = []

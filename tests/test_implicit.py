@@ -74,7 +74,7 @@ class TestLimit:
         return np.polyfit(np.log(x), np.log(error), 1)[0]
 
     @pytest.mark.parametrize("number", [29, 30])
-    def test_separation_with_a_flat_tail_differs_from_the_limit_in_proportion_to_v0(self, setting, number):
+    def test_separation_with_a_flat_tail_is_off_the_limit_in_proportion_to_v0(self, setting, number):
         """Both the creep of a stuck contact and its velocity at the end of the band are proportional to v0."""
         exact = solve(LIMIT, setting(number, "tustin", friction__alpha=10.0))
         found = solve(EXACT, setting(number, friction__alpha=10.0, friction__v0=self.V0))
@@ -84,7 +84,7 @@ class TestLimit:
 
     @pytest.mark.parametrize("alpha", [10.0, 1e5])
     @pytest.mark.parametrize("number", [29, 30])
-    def test_passage_over_the_top_of_the_band_takes_a_time_of_v0_to_the_two_thirds(self, setting, number, alpha):
+    def test_passage_over_the_band_takes_a_time_of_v0_to_the_two_thirds(self, setting, number, alpha):
         """The law is flat at its top: ``v0 x' = -(c t + x^2)`` has the time scale v0^(2/3)."""
         exact = solve(LIMIT, setting(number, "tustin", friction__alpha=alpha))
         found = solve(EXACT, setting(number, friction__alpha=alpha, friction__v0=self.V0))

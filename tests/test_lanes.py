@@ -162,7 +162,7 @@ class TestFriction:
             np.testing.assert_allclose(out / scale, exact / scale, rtol=0, atol=1e-14)
 
     @pytest.mark.parametrize("name", ["threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay", "andersson"])
-    def test_steepest_of_a_law_is_its_slope_at_rest_and_its_largest_outside_the_band(self, name):
+    def test_steepest_is_the_slope_at_rest_and_the_largest_outside_the_band(self, name):
         cls = LAWS[name]
         given = {"v0": 0.1, "v1": 0.4, "alpha": 7.0, "v_s": 0.3, "k_t": 20.0}
         law = made(cls, **{key: given[key] for key in declared(cls)})
@@ -266,7 +266,7 @@ def integrate(batch, steps, names, *, order=None, serial=False):
 
 class TestEachLane:
     @pytest.mark.parametrize(("model", "law"), mostly_slow(SCENES, [("ring", "bengisu-akay")]))
-    def test_run_side_by_side_agrees_with_the_single_run_and_ignores_its_neighbours(self, cells, model, law):
+    def test_run_side_by_side_agrees_with_the_single_run_despite_neighbours(self, cells, model, law):
         """Neighbours must not change a bit. Where friction jumps, rounding may move a jump by a step."""
         share = 1e-2 if family_of(LAWS[law]) is SetValued else 1e-9
         batch, names = family(cells, model, law), MODELS[model].outcomes

@@ -154,7 +154,7 @@ class TestSlowPulls:
 
 
 @pytest.mark.slow
-def test_angle_on_a_rocking_ring_repeats_to_rounding_after_ten_thousand_periods():
+def test_angle_on_a_rocking_ring_repeats_to_rounding_after_10000_periods():
     of = {
         "model": "ring-single-contact",
         "body": {"mass": 1.0},

@@ -333,7 +333,7 @@ class TestRegions:
 
     @some
     @given(every, st.floats(0.0, 100.0))
-    def test_friction_lies_between_zero_and_mu_s_and_above_mu_k_outside_the_band(self, laws, relative):
+    def test_friction_lies_between_0_and_mu_s_and_above_mu_k_outside_the_band(self, laws, relative):
         for found in laws:
             speed = relative * found.length
             value = mu(found.law, speed)
@@ -451,7 +451,7 @@ class TestCharacteristicValues:
             assert v_s * slope(law, times * v_s) > steepest
 
     @given(widths)
-    def test_tanh_has_slope_mu_k_over_v0_at_rest_and_three_quarters_of_mu_k_at_v0(self, v0):
+    def test_tanh_has_slope_mu_k_over_v0_at_0_and_three_quarters_mu_k_at_v0(self, v0):
         law = made(LAWS["tanh"], v0=v0)
         assert mu(law, 0.0) == 0.0
         assert slope(law, 0.0) == pytest.approx(MU_K / v0, rel=1e-14)

@@ -197,7 +197,7 @@ class TestSuddenOnsetOfChaos:
         # The stable motion contracts by a finite factor up to the end: no multiplier announces it.
         assert (ds.multiplier_1.values[~below] < 0.85).all()
 
-    def test_words_of_bands_that_are_narrower_than_the_tolerance_do_not_change_with_the_span(self):
+    def test_words_of_bands_below_the_tolerance_do_not_change_with_the_span(self):
         """One of four bands touches the speed of the belt, at times: the last lap may have a stop or none."""
         nu = np.linspace(1.7075, 1.7077, 9)
         for span in (3000.0, 4000.0, 15000.0):

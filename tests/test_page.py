@@ -125,7 +125,7 @@ def test_page_loads_nothing_from_elsewhere_and_fits_a_telephone(bokeh, tmp_path)
     assert int(re.search(r"max-width: (\d+)vw", tooltip)[1]) < 50
 
 
-def test_colours_of_a_variable_stand_beside_the_plot_and_on_a_narrow_screen_below_it(bokeh, tmp_path):
+def test_colours_stand_beside_the_plot_and_on_a_narrow_screen_below_it(bokeh, tmp_path):
     page = page_of(sweep(4, 3), tmp_path)
     (plot,) = models(page, "Figure")
     beside, below = (json.dumps(plot[side]).count('"ColorBar"') for side in ("right", "below"))
@@ -133,7 +133,7 @@ def test_colours_of_a_variable_stand_beside_the_plot_and_on_a_narrow_screen_belo
     assert "window.innerWidth < 600" in html.unescape(page)
 
 
-def test_page_holds_every_number_with_four_digits_and_no_bound_is_rounded_down(bokeh, tmp_path):
+def test_page_holds_numbers_with_four_digits_and_no_bound_is_rounded_down(bokeh, tmp_path):
     ds = sweep(5, 4)
     ds["t_separation"][2, 1] = np.nan
     cells = script(page_of(ds, tmp_path))["cells"]
@@ -188,7 +188,7 @@ def test_coordinates_of_a_cell_are_found_by_strides(bokeh, tmp_path):
             assert f"= {float(np.degrees(value) if 'angle' in name else value):.4g}" in text
 
 
-def test_cells_along_an_uneven_axis_have_pixels_in_proportion_to_their_width(bokeh, tmp_path):
+def test_cells_on_an_uneven_axis_have_pixels_in_proportion_to_their_width(bokeh, tmp_path):
     ds = sweep(3, 2).assign_coords(drive_amplitude=("drive_amplitude", [9.0, 0.0, 1.0]))
     found = script(page_of(ds, tmp_path))
     assert found["edges"][0].tolist() == [0.0, 0.5, 5.0, 13.0]
@@ -212,7 +212,7 @@ def rare(ds, *cells):
 
 
 @pytest.mark.parametrize("cell", [(0, 0), (1025, 2), (700, 1)])
-def test_thinned_page_says_so_with_the_shares_of_the_file_and_shows_rare_words(bokeh, tmp_path, cell):
+def test_thinned_page_says_so_with_shares_of_the_file_and_shows_rare_words(bokeh, tmp_path, cell):
     ds = rare(sweep(1026, 3)[["regime"]], cell)
     geometric = "drive_amplitude", np.geomspace(0.1, 10.0, 1026), ds["drive_amplitude"].attrs
     page = page_of(ds.assign_coords(drive_amplitude=geometric), tmp_path)
@@ -257,7 +257,7 @@ def test_map_writes_a_page_and_refuses_boundaries_in_it(bokeh, tmp_path, monkeyp
     assert "not for a page" in capsys.readouterr().err
 
 
-def test_zeros_among_numbers_over_decades_have_a_colour_of_their_own_and_the_least_number_has_not(bokeh, tmp_path):
+def test_zeros_have_a_colour_of_their_own_and_the_least_number_has_not(bokeh, tmp_path):
     ds = sweep(12, 10)
     errors = np.geomspace(1e-12, 1e-6, 120).reshape(12, 10)
     errors[:3] = 0.0

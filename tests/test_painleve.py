@@ -168,7 +168,7 @@ def sliding_bodies(jams, count=2):
     assert found == count
 
 
-def test_body_on_springs_keeps_the_rigid_reactions_where_D_is_negative_and_det_A_positive():
+def test_springs_keep_rigid_reactions_if_D_is_negative_and_det_A_positive():
     for scene, state, loads, root_mass in sliding_bodies(jams=False):
         errors = []
         for stiffness in (1e8, 1e10):
@@ -178,7 +178,7 @@ def test_body_on_springs_keeps_the_rigid_reactions_where_D_is_negative_and_det_A
         assert errors[1] < 0.02
 
 
-def test_reactions_of_a_body_on_springs_grow_without_bound_where_det_A_is_negative():
+def test_reactions_on_springs_grow_without_bound_where_det_A_is_negative():
     for scene, state, loads, root_mass in sliding_bodies(jams=True):
         for stiffness in (1e8, 1e10):
             reactions = on_springs(scene, *state, 1.2 * loads, stiffness, 60.0 * root_mass / np.sqrt(stiffness))
@@ -226,7 +226,7 @@ def tilted_on_springs(body, mu_s, turn, stiffness):
     ("angle", "offset", "inertia", "mu_s", "tilt"),
     [(0.118, 0.84, 0.753, (2.222, 0.174), 0.51), (0.116, 0.724, 0.626, (2.48, 0.488), 0.59)],
 )
-def test_body_sticks_on_where_the_determinant_vanishes_as_it_does_on_springs(angle, offset, inertia, mu_s, tilt):
+def test_body_sticks_on_where_the_determinant_vanishes_as_on_springs(angle, offset, inertia, mu_s, tilt):
     """A narrow body is tilted until a contact opens; det A vanishes on the way."""
     M, R, g, frequency = 0.1, 0.05, 9.81, 0.05
     xi = offset * R * np.cos(angle)
@@ -261,7 +261,7 @@ def test_body_sticks_on_where_the_determinant_vanishes_as_it_does_on_springs(ang
 
 
 @pytest.mark.slow
-def test_wedged_body_is_taken_along_by_a_ring_that_starts_with_an_infinite_acceleration():
+def test_wedged_body_follows_a_ring_that_starts_with_infinite_acceleration():
     """Its contacts are nearly opposite: the more the ring pulls, the more both press. Stick goes before slip.
 
     The time is that of ``benchmarks.reference``.

@@ -45,7 +45,7 @@ def test_plain_and_vectorised_runge_kutta_agree_with_rk4():
 
 @pytest.mark.slow
 @pytest.mark.skipif(in_c.compiler() is None, reason="no C compiler")
-def test_moreau_and_jeans_time_stepping_tends_to_the_package_at_first_order():
+def test_moreau_jean_time_stepping_tends_to_the_package_at_first_order():
     """Impact law, mechanics and zones of the peer are its own, and it knows no events."""
     scene = SCENES["impact"]
     # Coulomb friction as stiction without a drop, whose kernel other tests compile too.

@@ -244,7 +244,7 @@ def written_sweep(**sweep) -> xr.Dataset:
     ],
     ids=["in the sweep", "listed", "in the scene", "in two units"],
 )
-def test_axis_has_the_unit_in_which_the_configuration_wrote_it_and_the_file_stays_si(written, label, last):
+def test_axis_has_the_unit_of_the_configuration_and_the_file_stays_si(written, label, last):
     ds = written_sweep(**{"ring.radius": written, "drive.amplitude": ["1 rpm", "2 rpm"]})
     before = ds.copy(deep=True)
     ax = plots.regime_map(ds).axes[0]
@@ -457,7 +457,7 @@ def test_map_axis_may_consist_of_friction_laws():
     assert " = dahl" in title(plots.regime_map(ds, sel={"drive_amplitude": "dahl"}))
 
 
-def test_map_holds_the_nearest_value_and_tells_it_in_the_title_and_by_a_warning(caplog):
+def test_map_holds_the_nearest_value_and_tells_it_by_title_and_warning(caplog):
     ds = make_sweep((12, 9, 3))
     figure = plots.regime_map(ds, sel={"friction.rough.mu_k": 0.32, "zone_half_angle": "2.5 deg"})
     np.testing.assert_array_equal(mesh(figure).get_array()[0], ds["regime"][:, 0, 1])
@@ -729,7 +729,7 @@ class TestPanels:
         plots.map_panel(make_sweep(), var="t_separation", ax=left)
         assert left.figure.axes[-1].get_ylabel() == "time of separation (s)"
 
-    def test_map_panel_of_three_dimensions_is_refused_and_the_message_says_what_to_hold(self):
+    def test_map_panel_of_three_dimensions_is_refused_with_what_to_hold(self):
         with pytest.raises(InputError, match="friction_rough_mu_k: hold it, or draw regime_map"):
             plots.map_panel(make_sweep((3, 3, 2)), ax=panel())
         held = plots.map_panel(make_sweep((3, 3, 2)), sel={"friction.rough.mu_k": 0.1}, ax=panel())
@@ -762,7 +762,7 @@ class TestPanels:
             pyplot.close("all")
 
 
-def test_points_are_drawn_at_their_coordinates_in_the_colours_of_their_regimes():
+def test_points_are_drawn_at_their_coordinates_in_colours_of_regimes():
     ds = make_points()
     ds["certified"][:4] = 0
     figure = plots.regime_map(ds, x="zone_half_angle", y="drive_amplitude")
@@ -967,7 +967,7 @@ class TestWorkPrecision:
         assert axes.get_ylim()[1] < 1e5
         assert axes.get_legend().get_texts()[-1].get_text() == "failed or diverged (at the ceiling)"
 
-    def test_missing_errors_are_ignored_and_a_method_without_errors_is_not_drawn(self):
+    def test_missing_errors_are_ignored_and_a_method_without_any_is_not_drawn(self):
         ds = make_work(2)
         ds["error_end"][4:] = np.nan
         ds["error_end"][0, 1:] = np.nan
@@ -1027,7 +1027,7 @@ def test_suffix_decides_the_format_of_a_saved_figure(tmp_path):
 
 
 class TestColoursOfNumbers:
-    def test_periods_over_decades_are_coloured_by_their_logarithm_and_zeros_of_bounds_have_a_colour_of_their_own(self):
+    def test_periods_have_logarithmic_colours_and_zero_bounds_their_own_colour(self):
         ds = make_sweep((10, 10)).drop_vars("regime")
         shape = ds["t_separation"].dims
         ds["period"] = (shape, np.geomspace(0.1, 1000.0, 100).reshape(10, 10))
@@ -1052,7 +1052,7 @@ class TestColoursOfNumbers:
         for var in ("impacts", "gap_max"):
             assert plots.regime_map(ds, var=var).axes[1].get_yscale() == "linear"
 
-    def test_title_of_a_map_names_law_and_span_as_written_unless_they_were_swept(self):
+    def test_map_title_names_law_and_span_as_written_unless_they_were_swept(self):
         scene = {"friction": {"law": "dahl"}, "drive": {"law": "arctan", "amplitude": 2}, "time": {"span": "1 min"}}
         ds = make_sweep((10, 10)).assign_attrs(configuration=json.dumps({"scene": scene}))
         ds["drive_amplitude"].attrs["path"] = "drive.amplitude"

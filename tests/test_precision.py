@@ -163,7 +163,7 @@ class TestRecommendation:
         assert found.attrs["recommended"] == found["solver"].values[fastest]
 
     @pytest.mark.parametrize(("rtol", "meets"), [(1e-4, "misses"), (1e-11, "meets")])
-    def test_report_says_whether_the_solver_of_the_configuration_meets_the_target(self, found, rtol, meets):
+    def test_report_says_whether_the_configured_solver_meets_the_target(self, found, rtol, meets):
         solver, other = (
             next(name for name in found["solver"].values if name.endswith(f"rtol: {one!r}")) for one in (rtol, 1e-12)
         )

@@ -71,7 +71,7 @@ class TestFile:
                 expected = whole[name].values[run]
                 assert ds[name].values[run].astype(expected.dtype).tobytes() == expected.tobytes(), name
 
-    def test_inferred_labels_differ_from_the_full_grid_in_no_more_cells_than_the_bound_says(self, ds, full):
+    def test_inferred_labels_differ_from_the_full_grid_within_the_bound(self, ds, full):
         wrong = np.zeros(ds.regime.shape, dtype=bool)
         with xr.open_dataset(full, decode_times=False) as whole:
             for name in set(LABELS) & set(ds.data_vars):
@@ -254,7 +254,7 @@ class TestConfiguration:
             ringsweep.run({"scene": scene}, refine=True)
 
     @pytest.mark.slow
-    def test_option_of_the_command_line_gives_the_defaults_and_keeps_what_is_configured(self, config, tmp_path):
+    def test_command_line_option_gives_defaults_and_keeps_what_is_configured(self, config, tmp_path):
         output = tmp_path / "out.nc"
         assert cli.main(["run", str(config), "--refine", "-o", str(output)]) == 0
         with xr.open_dataset(output, decode_times=False) as found:

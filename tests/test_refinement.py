@@ -98,7 +98,7 @@ class TestBoundaries:
             assert computed[low][differ].all()
             assert computed[high][differ].all()
 
-    def test_boundary_that_leaves_a_block_through_an_edge_whose_ends_agree_is_followed(self):
+    def test_boundary_leaving_a_block_by_an_edge_with_equal_ends_is_followed(self):
         truth = np.zeros((129, 129), dtype=int)
         truth[40:70, 20:50] = 1
         truth[45:55, 20:120] = truth[35:125, 67:90] = 1
@@ -136,7 +136,7 @@ class TestBoundaries:
             for name in ("labels", "origin", "level"):
                 np.testing.assert_array_equal(getattr(found, name)[k], getattr(alone, name)[0])
 
-    def test_level_is_zero_on_the_coarse_lattice_and_greatest_beside_a_boundary(self):
+    def test_level_is_zero_on_the_coarse_lattice_and_greatest_at_a_boundary(self):
         truth = np.zeros((129, 129), dtype=int)
         truth[:, 75:] = 1
         found, _ = refined(truth, audit=0.0)

@@ -72,7 +72,7 @@ class TestReversals:
         assert outcome(np.zeros(100), omega).reversals == 0
         assert outcome(np.zeros(100), 1.01 * omega).reversals == 99
 
-    def test_chatter_between_two_passes_of_the_threshold_counts_as_one_reversal(self):
+    def test_chatter_between_two_threshold_passes_counts_as_one_reversal(self):
         omega = [1.0, *(0.9 * EPSILON * np.resize([1.0, -1.0], 20)), -1.0, 0.0, -1.0]
         assert outcome(np.zeros(len(omega)), omega).reversals == 1
 

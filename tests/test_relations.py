@@ -260,7 +260,7 @@ class TestSweeps:
 
 
 class TestShiftOfTime:
-    def test_forced_belt_launched_from_its_state_after_whole_periods_goes_on_alike(self):
+    def test_forced_belt_launched_again_after_whole_periods_goes_on_alike(self):
         kind = replace(KINDS["belt"], fixed={"force.frequency": 0.5})
         run = relations.random_scenes(kind, 200, np.random.default_rng(6))
 

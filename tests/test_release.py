@@ -32,13 +32,13 @@ def test_changelog_has_the_version_of_the_package_or_announces_it():
     assert f"## [{PROJECT['version']}]" in changelog or f"contents of {PROJECT['version']}" in changelog
 
 
-def test_every_citation_of_the_paper_is_in_its_list_and_the_other_way_round():
+def test_every_citation_of_the_paper_is_in_its_list_and_vice_versa():
     text, listed = ((ROOT / "paper" / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib"))
     cited = set(re.findall(r"@([a-z]+)", text.partition("# Summary")[2]))
     assert cited == set(re.findall(r"^@\w+\{(\w+),", listed, flags=re.MULTILINE))
 
 
-def test_release_is_refused_until_one_command_has_filled_the_address_of_the_project(tmp_path):
+def test_release_is_refused_until_one_command_fills_the_project_address(tmp_path):
     names = ("pyproject.toml", "CITATION.cff", ".ci/release")
     (tmp_path / ".ci").mkdir()
     for name in names:

@@ -139,7 +139,7 @@ def test_tasks_of_killed_processes_are_computed_when_the_sweep_goes_on(scene, by
     ("given", "own", "workers"), [({}, None, joblib.cpu_count()), ({"n_jobs": 3}, None, 3), ({"n_jobs": 3}, 2, 2)]
 )
 @pytest.mark.parametrize("backend", [{}, {"backend": "threading"}, {"backend": "loky"}])
-def test_number_of_workers_is_that_of_the_call_then_that_of_joblib_then_that_of_cores(backend, given, own, workers):
+def test_number_of_workers_comes_from_the_call_then_joblib_then_the_cores(backend, given, own, workers):
     with joblib.parallel_config(**backend, **given), Execution(own).open() as local:
         assert local.concurrency() == workers
 
@@ -267,7 +267,7 @@ def test_frozen_scheduler_does_not_hold_up_the_second_interrupt(scene, monkeypat
 
 
 @pytest.mark.slow
-def test_workers_that_pause_for_want_of_memory_are_told_with_the_likely_cure(monkeypatch, caplog):
+def test_workers_that_pause_for_want_of_memory_are_told_with_a_cure(monkeypatch, caplog):
     """A worker above its limit takes no task. Here the scheduler says so of one that works a second."""
     monkeypatch.setattr(remote, "_PAUSE", 0.05)
     monkeypatch.setattr("distributed.Client.scheduler_info", lambda *_, **__: {"workers": {"a": {"status": "paused"}}})

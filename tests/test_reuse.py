@@ -87,7 +87,7 @@ def test_points_take_cells_of_a_grid_and_a_grid_takes_points(scene, earlier, tmp
     assert [line.split(" cells")[0] for line in lines] == ["2 of 3", "2 of 15"]
 
 
-def test_sweep_over_laws_takes_cells_of_one_law_despite_parameters_of_others(scene, earlier, tmp_path, caplog):
+def test_sweep_over_laws_takes_cells_of_one_law_despite_other_parameters(scene, earlier, tmp_path, caplog):
     laws = scene | {"friction": scene["friction"] | {"alpha": 1e3}}
     axes = COARSE | {"friction.law": ["stiction", "tustin"]}
     assert taken(laws, axes, earlier, tmp_path, caplog) == 15

@@ -79,7 +79,7 @@ def order(x, error):
 class TestLimit:
     """With increasing stiffness the Dahl law tends to Coulomb friction."""
 
-    def test_difference_from_coulomb_in_sliding_is_of_first_order_in_the_compliance(self, dahl, rigid):
+    def test_sliding_differs_from_coulomb_in_first_order_of_the_compliance(self, dahl, rigid):
         """Beyond an edge the traction changes over a distance proportional to 1/sigma0."""
         sigma0 = 10.0 ** np.arange(3, 8)
         exact, found = solve(LIMIT, rigid(FAST)), solve(EXACT, dahl(FAST, sigma0))
@@ -89,14 +89,14 @@ class TestLimit:
         assert order(sigma0, abs(found.t_separation - exact.t_separation)) == pytest.approx(-1.0, abs=0.02)
         assert order(sigma0, abs(found.phi_end - exact.phi_end)) == pytest.approx(-1.0, abs=0.02)
 
-    def test_difference_from_coulomb_at_a_reversal_is_of_first_order_in_the_compliance(self, dahl, rigid):
+    def test_reversal_differs_from_coulomb_in_first_order_of_the_compliance(self, dahl, rigid):
         """At a reversal the bristles move over a distance proportional to 1/sigma0."""
         sigma0 = 10.0 ** np.arange(4, 9)
         exact, found = solve(LIMIT, rigid(LAUNCH)), solve(EXACT, dahl(LAUNCH, sigma0))
         assert order(sigma0, abs(found.phi_max - exact.phi_max)) == pytest.approx(-1.0, abs=0.02)
         assert order(sigma0, abs(found.phi_end - exact.phi_end)) == pytest.approx(-1.0, abs=0.1)
 
-    def test_difference_from_coulomb_in_stick_slip_has_the_power_two_thirds_of_the_compliance(self, dahl, rigid):
+    def test_stick_slip_differs_from_coulomb_by_compliance_to_the_two_thirds(self, dahl, rigid):
         """Breakaway under a load proportional to t has the time scale sigma0^(-1/3); its delay is the square of it."""
         sigma0 = 10.0 ** np.arange(4, 8)
         exact, found = solve(LIMIT, rigid(DRIVEN)), solve(EXACT, dahl(DRIVEN, sigma0))
@@ -234,7 +234,7 @@ class TestEnds:
         for found in (solve(LIMIT, rigid(values)), solve(EXACT, dahl(values, 1e5))):
             assert (found.regime, found.t_end, found.separating_contact) == (JAMMED, 0.0, 0)
 
-    def test_body_that_slides_onto_a_rough_arc_jams_at_the_instant_of_the_limit(self, dahl, rigid):
+    def test_body_sliding_onto_a_rough_arc_jams_at_the_instant_of_the_limit(self, dahl, rigid):
         values = {**ROUGH, "initial.omega": 30.0, "zone.center": 2.0}
         exact, found = solve(LIMIT, rigid(values)), solve(Implicit(), dahl(values, 1e5))
         assert exact.regime == found.regime == JAMMED

@@ -175,7 +175,7 @@ def test_a_chain_of_equal_cells_is_one_run():
     np.testing.assert_allclose(three.phi_section[-1], one.phi_section, atol=1e-9)
 
 
-def test_a_rocking_ring_has_two_motions_at_one_frequency_and_the_past_tells_which():
+def test_rocking_ring_has_two_motions_at_one_frequency_chosen_by_the_past():
     """A pendulum swings farther as its frequency falls behind that of the drive, up to a fold; then it sticks."""
     slippery = {"law": "stiction", "rest": {"mu_s": 0.12, "mu_k": 0.08}, "rough": {"mu_s": 0.12, "mu_k": 0.08}}
     found = run(ROCKING | {"friction": slippery, "time": {"span": 120.0}}, sweep={

@@ -168,7 +168,7 @@ class TestPolarView:
         told = {text.get_text() for text in ax.get_legend().get_texts()}
         assert told == {"zone", "elsewhere", "angle θ of the ring"}
 
-    def test_mark_is_at_the_angle_of_the_ring_and_an_arrow_shows_the_sense_of_rotation(self, run, ax):
+    def test_mark_is_at_the_angle_of_the_ring_and_an_arrow_shows_its_rotation(self, run, ax):
         for time, sense in ((1.2, 1.0), (1.2, -1.0), (1.2, 0.0)):
             ax.clear()
             plots.polar_view(run.assign(ring_omega=abs(run["ring_omega"]) * sense), time, ax)
@@ -228,7 +228,7 @@ class TestPhasePortrait:
         assert over.get_linewidth() < stick.get_linewidth()
         assert {tuple(point) for point in body} <= {tuple(point) for point in shown}
 
-    def test_portrait_in_the_frame_of_the_ring_has_a_band_for_each_arc_and_contact(self, run, ax):
+    def test_portrait_in_the_ring_frame_has_a_band_for_each_arc_and_contact(self, run, ax):
         plots.phase_portrait(run, "ring", ax)
         bands = {tuple(np.round(np.sort([p.get_x(), p.get_x() + p.get_width()]), 6)) for p in ax.patches}
         low, high = ax.get_xlim()
@@ -262,7 +262,7 @@ class TestPhasePortrait:
         with pytest.raises(InputError, match="neither 'space' nor 'ring'"):
             plots.phase_portrait(run, "body", ax)
 
-    def test_portrait_without_a_layout_is_not_cut_off_and_a_chosen_layout_stays(self, run):
+    def test_portrait_without_layout_is_not_cut_off_and_a_chosen_layout_stays(self, run):
         figure = Figure(figsize=(85 / 25.4, 75 / 25.4))
         ax = plots.phase_portrait(run, ax=figure.add_subplot())
         figure.draw_without_rendering()

@@ -139,7 +139,7 @@ class TestSingleContact:
     """A loop without friction."""
 
     @pytest.mark.parametrize("launch", [2.5, 3.0, 4.0, 4.9])
-    def test_single_contact_separates_where_the_weight_exceeds_the_centripetal_force(self, coulomb, run, launch):
+    def test_single_contact_separates_where_weight_exceeds_centripetal_force(self, coulomb, run, launch):
         """With R omega_0^2 = `launch` g the reaction vanishes at cos phi = (2 - launch) / 3."""
         omega = np.sqrt(launch * 9.81 / 0.043378)
         found = run(coulomb({"initial.omega": omega}, mu=0.0, model="ring-single-contact"), 20000)

@@ -1,6 +1,7 @@
-"""The rooms of the package: imports go one way, and a stranger can count the rooms."""
+"""The rooms of the package: imports go one way, and a stranger can count the rooms. Names of tests are short."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -61,3 +62,9 @@ def test_physics_knows_no_files_and_no_solver_knows_a_particular_model():
         for path in (PACKAGE / room).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             assert not [name for name in names if f"from ringsweep.{name}" in text], path
+
+
+def test_names_of_tests_have_at_most_70_letters():
+    for path in Path(__file__).parent.rglob("*.py"):
+        names = re.findall(r"def (test_\w+)", path.read_text(encoding="utf-8"))
+        assert not [name for name in names if len(name) > 70], path

@@ -223,7 +223,7 @@ class TestOrder:
         assert estimate == pytest.approx(5.0, abs=0.4)
 
     @pytest.mark.parametrize("stiffness", [1e4, 1e5, 1e6])
-    def test_order_on_a_slow_manifold_is_3_with_an_error_that_falls_with_stiffness(self, stiffness):
+    def test_order_on_a_slow_manifold_is_3_and_the_error_falls_with_stiffness(self, stiffness):
         """Stiffness reduces the order, but the error is divided by the stiffness."""
         steps = [8, 12, 16, 24, 32]
         end, within, _ = orders(ProtheroRobinson(stiffness), steps)

@@ -213,7 +213,7 @@ def test_indices_agree_with_those_of_salib() -> None:
 
 
 @pytest.mark.parametrize("missing", [False, True])
-def test_a_function_that_does_not_vary_or_has_gaps_has_indices_of_which_nothing_is_known(missing: bool) -> None:
+def test_indices_are_unknown_for_a_function_that_is_constant_or_has_gaps(missing: bool) -> None:
     rows = np.ones((8, 16, 4))
     if missing:
         rows += unit_points("random", 512, 1, 0, 0).reshape(rows.shape)
@@ -241,7 +241,7 @@ def test_the_probability_to_ride_is_that_of_the_closed_form(method: str) -> None
     assert ds.word.values.tolist() == list(REGIMES)
 
 
-def test_survival_and_quantiles_of_the_first_slip_are_those_of_the_closed_form() -> None:
+def test_survival_and_quantiles_of_the_first_slip_equal_the_closed_form() -> None:
     times = np.linspace(5.0, 9.0, 9)
     ds = run(config(survival={"linspace": [5.0, 9.0, 9]}, quantiles={"first_slip": [0.05, 0.5]}, n=1024))
     known = np.where(times < 7.0, probability_of_riding(times), probability_of_riding(7.0))
@@ -272,7 +272,7 @@ def test_indices_of_the_way_of_a_body_that_rides_are_those_of_a_product() -> Non
     assert (ds.sobol_first_high == 1.0).all()
 
 
-def test_indices_of_a_slip_until_a_time_are_those_of_runs_of_the_same_points() -> None:
+def test_indices_of_slip_by_a_time_are_those_of_runs_of_the_same_points() -> None:
     """The body slips by t if mu_s m g <= k v t, so its indicator follows from the points without a run."""
     of = {"friction.mu_s": {"uniform": [0.1, 0.2]}, "belt.velocity": {"uniform": [0.08, 0.12]}}
     times = np.array([5.0, 6.5])

@@ -76,7 +76,7 @@ def reference(times):
 
 
 @pytest.mark.slow
-def test_points_at_each_period_of_the_force_are_those_of_an_independent_integration():
+def test_points_at_each_force_period_equal_an_independent_integration():
     x, velocity, _ = reference(4.0 * np.arange(1, 13))
     ds = run(FORCED, {"at": "period", "keep": 12})
     assert ds.stick_time > 2.0

@@ -45,7 +45,7 @@ def points(ax):
     return [one for one in ax.collections if isinstance(one, PathCollection)]
 
 
-def test_up_and_down_are_points_in_two_colours_that_are_rasterised_under_a_strip_of_regimes(diagram):
+def test_up_and_down_are_rasterised_in_two_colours_under_a_regime_strip(diagram):
     ax = plots.bifurcation_panel(diagram, ax=Figure().subplots())
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["up", "down", "stick-slip", "oscillatory"]
     up, down = points(ax)
@@ -113,7 +113,7 @@ def test_multipliers_stand_in_the_complex_plane_with_the_unit_circle(multipliers
         plots.multiplier_circle(multipliers.drop_vars("multiplier_angle_1"))
 
 
-def test_the_circle_tells_up_from_down_by_its_marks_and_the_command_draws_it(multipliers, diagram, tmp_path):
+def test_circle_tells_up_from_down_by_its_marks_and_the_command_draws_it(multipliers, diagram, tmp_path):
     both = xr.concat([multipliers, multipliers], xr.DataArray(["up", "down"], dims="direction", name="direction"))
     ax = plots.multiplier_circle(both, ax=Figure().subplots())
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["up", "down"]

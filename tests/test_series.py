@@ -287,7 +287,7 @@ def test_kernels_and_python_find_the_same_first_roots():
 
 
 @pytest.mark.parametrize("fill", [swing_in_kernel, swing_in_kernel.py_func], ids=["kernel", "python"])
-def test_series_of_a_swing_obey_its_equation_and_a_pendulum_keeps_its_energy(fill):
+def test_series_of_a_swing_obey_its_equation_and_a_pendulum_keeps_energy(fill):
     factors = np.array([0.3, -1.1, 0.4, 0.2, 0.1])
     for pendulum in (False, True):
         rows = np.zeros((4, COLUMNS))

@@ -207,7 +207,7 @@ class TestEnergy:
         return abs(kinetic + potential - 1.0)[0], found.steps[0]
 
     @pytest.mark.parametrize(("law", "method"), [("bengisu-akay", Implicit), ("stiction", Event)])
-    def test_energy_drift_of_event_and_implicit_is_within_the_sum_of_tolerances(self, cells, law, method):
+    def test_energy_drift_of_event_and_implicit_is_within_summed_tolerances(self, cells, law, method):
         """The drift is less than the tolerance of a step times the number of steps."""
         for rtol in (1e-7, 1e-10):
             drift, steps = self.drift(cells, method(rtol, certify=False), law, 1000.0)

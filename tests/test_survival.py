@@ -193,7 +193,7 @@ class TestContinuation:
         assert cli.main(command) == 0
         assert same_bits(target, never_stopped)
 
-    def test_interrupt_during_the_first_tasks_tells_that_it_waits_for_compilation(
+    def test_interrupt_in_the_first_tasks_says_that_it_waits_for_compilation(
         self, config, tmp_path, monkeypatch, caplog, small_tasks
     ):
         def interrupted(*arguments):
@@ -313,7 +313,7 @@ class TestCheckpoint:
         assert "another ringsweep is computing it" in capsys.readouterr().err
         assert left(target) == []
 
-    def test_sweep_of_another_version_is_told_by_its_version_and_names_do_not_matter(self, config, scene):
+    def test_sweep_of_another_version_is_told_by_its_version_and_not_by_names(self, config, scene):
         friction = dict(scene["friction"])
         own = friction.pop("rest")
         rest, elsewhere = (
@@ -360,7 +360,7 @@ class TestCheckpoint:
         assert "out.nc is replaced when this sweep is done" in caplog.text
         assert same_bits(half_done, never_stopped)
 
-    def test_finished_sweep_is_told_beside_cells_of_the_one_that_would_replace_it(
+    def test_finished_sweep_is_told_beside_cells_of_the_sweep_replacing_it(
         self, config, half_done, never_stopped, capsys
     ):
         kept = tasks_of(half_done)

@@ -16,7 +16,7 @@ BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1
 
 
 class TestThreshold:
-    def test_belt_carries_its_load_until_the_spring_reaches_the_static_friction(self):
+    def test_belt_carries_its_load_until_the_spring_reaches_static_friction(self):
         """The spring is stretched by v T: k v T = mu_s m g."""
         for stiffness in (2.0, 3.0):
             scene = BELT | {"spring": {"stiffness": stiffness}}
