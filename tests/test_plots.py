@@ -257,6 +257,14 @@ def test_axis_has_the_unit_of_the_configuration_and_the_file_stays_si(written, l
     xr.testing.assert_identical(ds, before)
 
 
+def test_lengths_of_runs_have_the_unit_of_the_lengths_in_the_scene():
+    ds = written_sweep(**{"ring.radius": ["20 mm", "50 mm"], "drive.amplitude": ["1 rpm", "2 rpm"]})
+    ds["gap_max"] = xr.full_like(ds["t_separation"], 0.002).assign_attrs(OUTCOMES["gap_max"].attributes)
+    ax, bar = plots.regime_map(ds, var="gap_max").axes[:2]
+    assert bar.get_ylabel().endswith("(mm)")
+    np.testing.assert_allclose(mesh(ax.figure).get_array(), 2.0)
+
+
 def test_unit_of_the_user_is_that_of_the_axis_and_a_wrong_one_is_refused():
     ds = written_sweep(**{"ring.radius": ["20 mm", "50 mm"]})
     assert plots.regime_map(ds, units={"ring.radius": "cm"}).axes[0].get_ylabel() == "radius (cm)"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import suppress
+from typing import Any
 
 import xarray as xr
 from matplotlib.axis import Axis
@@ -14,7 +15,7 @@ from ringsweep.plots import look
 from ringsweep.plots.datasets import is_numeric, resolve
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
-from ringsweep.quantities.variables import configuration_of, swept, written_unit
+from ringsweep.quantities.variables import common_unit, configuration_of, leaves, swept, written_unit
 
 MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
@@ -62,7 +63,8 @@ def label_axis(axis: Axis, name: str, unit: str) -> None:
 def in_units(ds: xr.Dataset, units: Mapping[str, str] | None = None) -> xr.Dataset:
     """A dataset whose quantities tell in which unit pictures show them; its numbers stay SI.
 
-    A swept quantity has the unit in which its configuration wrote it. Angles have that of the style.
+    A swept quantity has the unit in which its configuration wrote it, a length of the runs that of the lengths in the
+    scene. Angles have the unit of the style.
 
     Parameters
     ----------
@@ -85,11 +87,22 @@ def in_units(ds: xr.Dataset, units: Mapping[str, str] | None = None) -> xr.Datas
                 # The user may have changed the unit of the coordinate since.
                 with suppress(InputError):
                     _show_in(ds, str(coordinate.name), unit)
+        length = common_unit(value for value in leaves(source.get("scene")) if _is_length(value))
+        for name in ds.data_vars:
+            if length and ds[name].attrs.get("units") == "m":
+                _show_in(ds, str(name), length)
     for name, unit in (units or {}).items():
         if not isinstance(unit, str):
             raise InputError(f"units.{name}", f"{unit!r} is no unit: give its name, such as 'mm'")
         _show_in(ds, resolve("units", name, ds.variables), unit)
     return ds
+
+
+def _is_length(value: Any) -> bool:
+    try:
+        return isinstance(value, str) and quantity(value, Parameter("m", "length"), "scene") is not None
+    except InputError:
+        return False
 
 
 def _show_in(ds: xr.Dataset, name: str, unit: str) -> None:

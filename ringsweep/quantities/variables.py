@@ -418,8 +418,8 @@ def written_values(configuration: Mapping[str, Any], path: str) -> list[Any]:
     axes: dict[str, Any] = {}
     for columns in ((configuration.get("sweep") or {}).get(key) or {} for key in ("points", "grid")):
         axes |= {name.strip(): given for names, given in columns.items() for name in names.split(",")}
-    on_axis = _leaves(axes.get(path))
-    return on_axis if any(isinstance(value, str) for value in on_axis) else _leaves(written(configuration, path))
+    on_axis = leaves(axes.get(path))
+    return on_axis if any(isinstance(value, str) for value in on_axis) else leaves(written(configuration, path))
 
 
 def written_unit(configuration: Mapping[str, Any], path: str) -> str:
@@ -434,11 +434,11 @@ def common_unit(values: Iterable[Any]) -> str:
     return units.pop() if len(units) == 1 else ""
 
 
-def _leaves(value: Any) -> list[Any]:
+def leaves(value: Any) -> list[Any]:
     """All values within a value of a configuration."""
     if not isinstance(value, Mapping | list):
         return [value]
-    return [leaf for part in (value.values() if isinstance(value, Mapping) else value) for leaf in _leaves(part)]
+    return [leaf for part in (value.values() if isinstance(value, Mapping) else value) for leaf in leaves(part)]
 
 
 def in_unit(data: xr.DataArray, unit: str) -> xr.DataArray:
