@@ -33,7 +33,8 @@ _FALL_FACTOR = 5.0
 @audit.least_scales.implements(Belt, BristleBelt)
 def _least_scales(batch):
     """The scale of a time at least, s: that of a spring's swing."""
-    return {"s": np.minimum(np.sqrt(batch.body.mass / np.maximum(np.abs(batch.body.stiffness), 1e-300)), batch.span)}
+    with np.errstate(divide="ignore", over="ignore"):
+        return {"s": np.minimum(np.sqrt(batch.body.mass / np.abs(batch.body.stiffness)), batch.span)}
 
 
 @audit.violation.implements(Belt)
