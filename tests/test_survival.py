@@ -96,6 +96,29 @@ def stopping(monkeypatch, owner, name, after):
         yield
 
 
+def test_interrupt_while_threads_start_loses_no_result_before(monkeypatch):
+    computed, started, start = threading.Event(), [], threading.Thread.start
+
+    def compute(task):
+        if task[0] == 1:
+            computed.set()
+        return int(task[0])
+
+    def interrupted(thread):
+        started.append(thread)
+        if len(started) == 2:
+            computed.wait(60.0)
+            raise KeyboardInterrupt
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", interrupted)
+    found, stopped = [], threading.Event()
+    with Execution(2).open() as workers, pytest.raises(KeyboardInterrupt):
+        tasks = (np.array([k]) for k in range(3))
+        found.extend(workers.results(compute, tasks, lambda result: result, stopped))
+    assert found[:1] == [0]
+
+
 @pytest.fixture
 def half_done(config, tmp_path, monkeypatch, small_tasks):
     """Path of the result file of a sweep that was stopped after ten tasks."""

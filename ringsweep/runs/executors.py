@@ -129,10 +129,10 @@ class Local:
         failure = None
         # Its exit kills processes that still have tasks.
         with parallel:
-            for _ in range(threads):
-                # Daemons, so that a second Ctrl-C need not wait for their tasks.
-                threading.Thread(target=work, daemon=True).start()
             try:
+                for _ in range(threads):
+                    # Daemons, so that a second Ctrl-C need not wait for their tasks.
+                    threading.Thread(target=work, daemon=True).start()
                 while threads:
                     if isinstance(item := found.get(), BaseException):
                         failure = failure or item
