@@ -112,10 +112,9 @@ def test_interrupt_while_threads_start_loses_no_result_before(monkeypatch):
         start(thread)
 
     monkeypatch.setattr(threading.Thread, "start", interrupted)
-    found, stopped = [], threading.Event()
+    found, tasks = [], (np.array([k]) for k in range(3))
     with Execution(2).open() as workers, pytest.raises(KeyboardInterrupt):
-        tasks = (np.array([k]) for k in range(3))
-        found.extend(workers.results(compute, tasks, lambda result: result, stopped))
+        found.extend(workers.results(compute, tasks, lambda result: result, threading.Event()))
     assert found[:1] == [0]
 
 
