@@ -19,8 +19,8 @@ import joblib
 import numpy as np
 from joblib.parallel import get_active_backend
 from numpy.typing import NDArray
+from tqdm import tqdm
 from tqdm.auto import tqdm as bar
-from tqdm.std import tqdm
 
 from ringsweep.errors import InputError
 from ringsweep.runs.needs import duration
