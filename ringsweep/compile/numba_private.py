@@ -48,6 +48,8 @@ class _CalleeLibrary(JITCodeLibrary):
         CodeLibrary.__init__(self, codegen, name)
         self._linking_libraries: list[Any] = []
         self._text, self._shared_module = "", None
+        # Numba 0.63 makes it in the class that is passed over here.
+        self._reload_init: set[Any] = set()
 
     def add_ir_module(self, ir_module: Any) -> None:
         self._text = cgutils.normalize_ir_text(str(ir_module))
