@@ -165,7 +165,8 @@ class TestProgress:
         now = [0.0]
         monkeypatch.setattr("tqdm.std.time", lambda: now[0])
         with caplog.at_level("INFO", "ringsweep"), executors.progress_bar(60, True) as bar:
-            for now[0] in (30.0, 61.0, 100.0, 121.0, 123.0, 200.0):
+            for seconds in (30.0, 61.0, 100.0, 121.0, 123.0, 200.0):
+                now[0] = seconds
                 bar.update(10)
         assert caplog.messages == ["20 runs of 60: about 2 min left", "50 runs of 60: about 25 s left"]
 
