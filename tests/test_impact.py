@@ -103,7 +103,7 @@ class TestParticle:
         ends = falls * (1 + e) / (1 - e)
         above = {"initial": {"phi": pi, "omega": 0.0}, "impact": {"restitution": e}, "time": {"span": 1.1 * ends}}
         run = ringsweep.simulate(PARTICLE | above, samples=50)
-        # Rounding decides on which side of the centre it falls, and so the extremes of its angle. Beside it nothing does.
+        # Rounding decides on which side of the centre it falls, and so the extremes of its angle.
         beside = above | {"initial": {"phi": pi - 1e-7, "omega": 0.0}}
         assert ringsweep.simulate(PARTICLE | beside, samples=50).certified.item() == 1
         k = np.arange(len(run.impact_time))
