@@ -14,7 +14,7 @@ HISTORY = (
     *("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"),
     *("x", "y", "gap_1", "gap_2"),
 )
-#: Columns behind them: the last event, see :class:`ringsweep.models.ring.impact.mode.Mode`.
+#: Columns behind them: the last event, see :class:`ringsweep.models.ring.impact.mode.Event`.
 EVENT = ("number", "time", "event", "contact", "speed", "impulse")
 
 
