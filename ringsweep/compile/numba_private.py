@@ -32,7 +32,7 @@ from numba.core.runtime.context import NRTContext
 from numba.core.typed_passes import InlineOverloads, IRLegalization, NativeLowering, NopythonRewrites
 from numba.core.typing.context import Context
 from numba.core.typing.templates import AbstractTemplate, infer, infer_global
-from numba.core.untyped_passes import InlineClosureLikes, WithLifting
+from numba.core.untyped_passes import InlineClosureLikes, IRProcessing, WithLifting
 from numba.extending import intrinsic, register_model
 
 logger = logging.getLogger("ringsweep")
@@ -186,7 +186,7 @@ class _Typing(Context):
     """Numba's typing with a memory of signatures. For each operation Numba tries dozens of overloads."""
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
-        if kws or type(func) is not types.Function:
+        if kws or not (type(func) is types.Function or func in _OPERATORS):
             return super().resolve_function_type(func, args, kws)
         key = id(func), tuple(args)
         if key not in _signatures:
@@ -280,8 +280,10 @@ class _Passes(PassManager):
         one.run_finalizer(state)
 
 
-# Kernels have no blocks ``with``, and no loops over whole arrays to fuse.
-_NEEDLESS = (WithLifting, NopythonRewrites), (WithLifting, NopythonRewrites, InlineClosureLikes, InlineOverloads)
+# Kernels have no blocks ``with``, and no loops over whole arrays to fuse. Nothing reads how long variables live before
+# later passes compute it again.
+_ALWAYS = IRProcessing, WithLifting, NopythonRewrites
+_NEEDLESS = _ALWAYS, (*_ALWAYS, InlineClosureLikes, InlineOverloads)
 
 _INLINED_BY_NUMBA = {"reduce", "bool"}
 
