@@ -14,6 +14,7 @@ import yaml
 from matplotlib.figure import Figure
 
 import ringsweep
+from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.errors import InputError
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -190,6 +191,10 @@ CLAIMS = {
         exact = 0.4905 + 0.0095 * np.cos(2.0 * w)
         coarse, fine = (run(scene, {"method": "heun", "steps": n})["x_end"] - exact for n in (200, 400))
         assert 3.8 < coarse / fine < 4.2, (coarse.item(), fine.item())
+    """,
+    "kernels and results with own files have another key than those without": f"""
+        from ringsweep.compile import SOURCES_DIGEST
+        assert SOURCES_DIGEST != {SOURCES_DIGEST!r}
     """,
     "a result names the files of what it used": """
         still_disc = {"friction": {"law": "weakening", "rest": {"mu_s": 0.15, "mu_k": 0.1}, "v1": 1.0}, "drive": still}
