@@ -14,8 +14,6 @@ from scipy.optimize import linprog
 from tiers import mostly_slow
 
 import ringsweep
-from benchmarks.hostile.attack import same_bits
-from benchmarks.hostile.kills import killed_at
 from ringsweep import cli
 from ringsweep.errors import InputError
 from ringsweep.models.ring.impact.switch import SUMMED
@@ -41,12 +39,8 @@ BODY = (
     | course("arctan", 3, span="5 s", e=0.5)
 )
 #: Friction is mu_s below the speed vb, and mu_k above.
-JUMPING = {
-    "model": "ring",
-    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.010},
-    "ring": {"radius": 0.043378},
-    "friction": {"law": "formula", "mu": "piecewise(v < vb, mu_s, mu_k)", "at_rest": "mu_s"},
-}
+STEPPING = {"mu": "piecewise(v < vb, mu_s, mu_k)", "at_rest": "mu_s"}
+RIG = shape(0.076, 4.47e-5, 0.025, 0.010, 0.043378)
 AMPLITUDES = np.geomspace(1.5, 12, 12)
 AT_REST = BODY | {"drive": {"law": "arctan", "amplitude": 0.0}, "time": {"span": "2 s"}}
 LAUNCHES = np.linspace(18.0, 60.0, 8)
@@ -161,11 +155,11 @@ class TestBody:
         assert (drums.aftermath.values == 0).tolist() == (~lost).values.tolist()
         assert (drums.open_time >= drums.flight_time).all()
         assert (drums.gap_max.where(lost, 1.0) > 0.0).all()
+        assert (drums.gap_max <= 2 * (0.043378 - 0.008 - 0.0315) + 1e-9).all()
 
     def test_run_with_an_impact_that_gains_energy_is_not_certified(self):
         """Newton's law may gain energy at strong friction, as in Kane's example. No body on springs does."""
-        strong = {"mu_s": 0.6, "mu_k": 0.4}
-        scene = AT_REST | {"friction": {"law": "stiction", "rough": strong, "rest": strong}}
+        scene = AT_REST | rubs("stiction", rest=(0.6, 0.4), rough=(0.6, 0.4))
         axes = {"impact.restitution": [0.5, 0.8, 1.0], "initial.omega": [20.0, 25.0, 35.0], "initial.phi": [0.0, 1.0]}
         found = ringsweep.sweep(scene, axes, progress=False)
         assert (found.impact_loss.values < -1e-6).any()
@@ -205,8 +199,7 @@ class TestBody:
     @pytest.mark.parametrize("half_angle", [0.0, np.pi])
     def test_pivot_passes_a_zone_of_no_width_and_the_ends_of_one_all_around(self, half_angle):
         """Both edges are at one place, with the same friction on either side: they change nothing."""
-        mu = {"mu_s": 0.4, "mu_k": 0.3}
-        scene = BODY | {"friction": {"law": "stiction", "rest": mu, "rough": mu}, "time": {"span": 2.0}}
+        scene = BODY | rubs("stiction", rest=(0.4, 0.3), rough=(0.4, 0.3)) | {"time": {"span": 2.0}}
         axes = {"drive.amplitude": AMPLITUDES, "zone.center": [0.3, 1.0, 2.0]}
         here, there = (
             ringsweep.sweep(scene | {"zone": {"half_angle": width}}, axes, progress=False)
@@ -311,30 +304,13 @@ class TestBody:
                 checked += 1
         assert checked
 
-    def test_ball_that_rolls_onto_a_smooth_zone_begins_to_slip(self):
-        """Without slip a ball on which the body pivots still rolls over the ring, onto the edge of a zone.
-
-        There it slides against the direction in which it rolls. Word and numbers are those of ``benchmarks.reference``.
-        """
-        scene = (
-            BODY
-            | shape(0.267278, 0.000496468, 0.0440407, 0.0191723, 0.0741464, zone=(2.86196, pi))
-            | rubs("stiction", rest=(0.576639, 0.327377), rough=(0.0175763, 0.00977993))
-            | course("arctan", 0.533024, omega=-20.1769, span=2.08644)
-        )
-        found = ringsweep.sweep(scene, {"impact.restitution": [0.599883]}, progress=False)
-        assert ringsweep.words(found.aftermath).item() == "tumbled"
-        assert found.t_end.item() == 2.08644
-        assert found.t_recovered.item() == pytest.approx(1.106471579, abs=1e-5)
-        assert found.phi_end.item() == pytest.approx(-3.365267361, rel=1e-6)
-
     def test_hit_beside_the_other_contact_is_a_tumble_even_if_it_rebounds(self):
         """A body on compliant contacts, ``benchmarks.reference.rattling``, lies on both of them soon afterwards."""
         scene = (
             BODY
             | rubs("stiction", rest=(0.495015, 0.310563), rough=(0.825201, 0.451686))
             | course("arctan", -1.47684, phi=-0.318961, omega=9.26745, e=0.277441)
-            | {"body": JUMPING["body"], "zone": {"half_angle": 2.42694, "center": 2.80857}}
+            | {"body": RIG["body"], "zone": {"half_angle": 2.42694, "center": 2.80857}}
         )
         found = ringsweep.sweep(scene, {"time.span": [1.69, 1.70, 1.74]}, progress=False)
         assert ringsweep.words(found.aftermath).values.tolist() == ["open", "tumbled", "tumbled"]
@@ -342,17 +318,6 @@ class TestBody:
         assert found.tumbles.values.tolist() == [0, 1, 1]
         # Contact 2 holds throughout: both have not been closed again.
         assert np.isnan(found.t_recovered.values).all()
-
-    @pytest.mark.slow
-    def test_reaction_with_a_sign_change_at_infinity_jams_and_opens_no_contact(self):
-        """The body pivots on a contact that would enter the race if it opened. The time is that of the reference."""
-        scene = (
-            shape(0.475957, 4.73961e-06, 0.00424212, 0.0128909, 0.0420561, zone=(2.70773, pi))
-            | rubs("tustin", rest=(0.235758, 0.10485), rough=(0.48332, 0.267488), alpha=1702030.0)
-            | course("power", 8.84074, 1.53252, phi=2.84616, omega=89.1353, span=0.256649)
-        )
-        found = ringsweep.sweep(scene | {"impact": {"restitution": 0.0}}, {"time.span": [0.256649]}, progress=False)
-        assert found.t_end.item() == pytest.approx(0.24783247, abs=1e-7)
 
     @pytest.mark.slow
     def test_rising_friction_takes_a_body_along_and_is_no_certified_jam(self):
@@ -378,38 +343,6 @@ class TestBody:
         # At the end the ring turns at 1 rad/s.
         np.testing.assert_allclose(found.omega_end.values[:2], 0.75311, atol=4e-4)
         assert ringsweep.words(found.regime).values[2] == "failed"
-
-    @pytest.mark.slow
-    def test_last_rebounds_that_friction_forbids_close_the_contact(self):
-        """An impact at one contact while the other one holds need not have a solution with restitution.
-
-        Among the last of unending rebounds, of 1e-8 m/s, the body closes and goes on. The gap is that of
-        ``benchmarks.reference``.
-        """
-        scene = (
-            BODY
-            | shape(0.213905, 6.69e-05, 0.0255529, 0.00972928, 0.0362977, zone=(1.03967, 2.16646))
-            | rubs("tustin", rest=(0.366641, 0.366641), rough=(0.00943182, 0.00778139), alpha=1702030.0)
-            | course("power", -6.43394, 2.20164, phi=1.03281, omega=0.0, e=0.7348)
-        )
-        found = ringsweep.sweep(scene, {"time.span": [1.2]}, progress=False)
-        assert found.t_end.item() == 1.2
-        assert found.gap_max.item() == pytest.approx(0.002025674, abs=1e-9)
-
-    def test_contact_that_opens_at_breakaway_opens_by_its_acceleration(self):
-        """When stick ends and no slip holds both contacts, one opens at once: the other ball must slide, not stick.
-
-        The numbers are those of the reference.
-        """
-        scene = (
-            BODY
-            | shape(0.364591, 0.000196867, 0.0193353, 0.00469679, 0.0315957, zone=(2.0, pi))
-            | rubs("stiction", rest=(0.223021, 0.166925), rough=(0.718786, 0.355663))
-            | course("arctan", -8.66607, phi=-1.08749, omega=22.8486, span=1.0)
-        )
-        found = ringsweep.sweep(scene, {"impact.restitution": [0.169101]}, progress=False)
-        assert ringsweep.words(found.aftermath).item() == "tumbled"
-        assert found.phi_end.item() == pytest.approx(-3.1472056528869796, rel=1e-9)
 
     def test_wedged_body_that_rebounds_from_each_contact_in_turn_rests_on_both(self):
         """Friction forbids that one contact rebounds while the other one rests, which has just been summed.
@@ -438,77 +371,17 @@ class TestBody:
         np.testing.assert_array_equal(found.t_end, 1.5)
         np.testing.assert_allclose(found.t_recovered, [0.0814800164309276, 0.3779313, 0.361665906], rtol=2e-6)
 
-    def test_contacts_that_rebound_in_turn_close_together(self):
-        """Each impact at one contact brings the other one down, until both hold. The angle is that of the reference."""
-        scene = (
-            BODY
-            | shape(0.34295, 0.00034546, 0.039532, 0.02979, 0.073942, zone=(2.0, pi))
-            | rubs("stiction", rest=(0.52646, 0.50751), rough=(0.69648, 0.4932))
-            | course("arctan", -2.8076, phi=2.8394, omega=2.8514, span=1.0)
-        )
-        found = ringsweep.sweep(scene, {"impact.restitution": [0.11094]}, progress=False)
-        assert found.t_end.item() == 1.0
-        assert found.phi_end.item() == pytest.approx(1.9295466835627817, rel=1e-9)
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize(
-        ("scene", "phi_end"),
-        [
-            # Pushed off both contacts, the body stays at rest while the ring has moved on.
-            pytest.param(
-                shape(0.0622681, 4.35788e-05, 0.0263802, 0.0238993, 0.0987501, zone=(1.08239, 2.715))
-                | rubs("tustin", rest=(0.391247, 0.124068), rough=(0.521341, 0.26673), alpha=16.9413)
-                | course("power", 0.169772, 1.05595, phi=-2.75764, omega=0.0, span=0.924103, e=0.803551),
-                -3.059077252,
-                id="off both",
-            ),
-            # A body that is wedged on one contact is taken along.
-            pytest.param(
-                shape(0.382064, 2.82698e-06, 0.00257343, 0.0165818, 0.0421444, zone=(2.85642, 1.33532))
-                | rubs("tustin", rest=(0.435147, 0.435147), rough=(0.333057, 0.0930198), alpha=20800.1)
-                | course("power", 9.3018, 1.71787, phi=1.22941, omega=0.0, span=2.59935, e=0.401576),
-                2.351071097,
-                id="wedged on one",
-            ),
-            # Its contacts hit so nearly at once that friction forbids both impacts together, but not in turn.
-            pytest.param(
-                shape(0.0947472, 4.42698e-07, 0.00433759, 0.0168983, 0.0427085, zone=(1.4492, pi))
-                | rubs("tustin", rest=(0.484993, 0.471637), rough=(0.0623722, 0.0607234), alpha=9.24635)
-                | course("power", -0.186147, 1.48619, phi=1.02004, omega=0.0, span=1.74251, e=0.772468),
-                2.725634,
-                id="both in turn",
-            ),
-        ],
-    )
-    def test_start_with_infinite_acceleration_goes_on_as_the_reference_does(self, scene, phi_end):
-        found = ringsweep.sweep({"model": "ring"} | scene, {"time.span": [scene["time"]["span"]]}, progress=False)
-        assert found.phi_end.item() == pytest.approx(phi_end, abs=1e-6)
-
     @pytest.mark.slow
     def test_contact_opens_by_its_acceleration_where_friction_jumps_at_a_speed(self):
         """The gap grows like t^2. The numbers are those of the free body, integrated by SciPy with its own balances."""
         scene = (
-            JUMPING
+            RIG
+            | rubs("formula", rest=(0.227239, 0.00340348), vb=0.0548297, **STEPPING)
             | course("sinusoidal", 0.0607017, 2.35927, 0.5 * pi, phi=1.63614, omega=0.0, span=0.3, e=0.0)
-            | {"friction": JUMPING["friction"] | {"vb": 0.0548297, "rest": {"mu_s": 0.227239, "mu_k": 0.00340348}}}
         )
         run = ringsweep.simulate(scene, samples=50)
         assert run.impact_time.values[-1] == pytest.approx(0.25515686191877684, rel=1e-9)
         assert run.impact_speed.values[-1] == pytest.approx(0.0024191139510299285, rel=1e-6)
-
-    @pytest.mark.slow
-    def test_body_that_has_no_motion_where_friction_jumps_at_a_speed_jams(self):
-        """Under the greater friction contact 2 would pull, and contact 1 alone would press itself into the race."""
-        scene = (
-            JUMPING
-            | shape(0.362325, 1.36913e-05, 0.0127683, 0.0244479, 0.0645043)
-            | course("sinusoidal", 0.0, 1.0, phi=1.55313, omega=-22.6359, e=0.0641463)
-            | {"friction": JUMPING["friction"] | {"vb": 1.16804, "rest": {"mu_s": 0.780949, "mu_k": 0.430834}}}
-        )
-        found = ringsweep.sweep(scene, {"time.span": [0.5]}, progress=False)
-        assert ringsweep.words(found.regime).item() == "jammed"
-        assert found.certified.item() == 1
-        assert found.omega_end.item() == pytest.approx(-1.16804 / 0.0645043, rel=1e-12)
 
     @pytest.mark.slow
     def test_body_wedged_on_one_contact_turns_faster_than_the_jerking_ring(self):
@@ -518,18 +391,11 @@ class TestBody:
         give psi_dd = M R (r - u) / (J + M w^2 + M (r - u)^2) times the acceleration of the ring.
         """
         mass, moment, half, ball, radius = 0.277488, 1.55222e-05, 0.0108799, 0.0174689, 0.0466026
-        mu = {"mu_s": 0.788576, "mu_k": 0.478072}
-        scene = {
-            "model": "ring",
-            "body": {"mass": mass, "inertia": moment, "half_distance": half, "ball_radius": ball},
-            "ring": {"radius": radius},
-            "friction": {"law": "tustin", "alpha": 1e6, "rest": mu, "rough": mu},
-            "zone": {"half_angle": 2.60162, "center": -0.672517},
-            "drive": {"law": "power", "amplitude": 11.2748, "exponent": 1.07766},
-            "initial": {"phi": 1.77461, "omega": 0.0},
-            "time": {"span": 0.01},
-            "impact": {"restitution": 0.0},
-        }
+        scene = (
+            shape(mass, moment, half, ball, radius, zone=(2.60162, -0.672517))
+            | rubs("tustin", rest=(0.788576, 0.478072), rough=(0.788576, 0.478072), alpha=1e6)
+            | course("power", 11.2748, 1.07766, phi=1.77461, omega=0.0, span=0.01, e=0.0)
+        )
         reach = radius - ball
         sine = half / reach
         xi = reach * sqrt(1.0 - sine**2)
@@ -542,45 +408,13 @@ class TestBody:
         assert (run.normal_1.values[early] > 1e9).all()
         np.testing.assert_allclose(run.omega.values[early], ratio * run.ring_omega.values[early], rtol=1e-3)
 
-    @pytest.mark.slow
-    def test_impact_of_a_wedged_body_has_its_solution_although_impulses_cancel(self):
-        """Both impulses are 1e5 times the momentum. With 40 digits one of the 16 modes is admissible."""
-        scene = (
-            shape(0.149936, 8.98195e-05, 0.0274996, 0.00955871, 0.0375752, offset=0.00105183, zone=(0.153688, 0.333103))
-            | rubs("tustin", rest=(0.501325, 0.194777), rough=(0.103706, 0.103706), alpha=1859.76)
-            | course("power", 1.50143, 2.92213, phi=0.953257, omega=14.4442, e=0.71469)
-        )
-        found = ringsweep.sweep(scene, {"time.span": [0.659132]}, progress=False)
-        assert found.phi_end.item() == pytest.approx(1.83277839, abs=1e-8)
-        assert found.impulse_max.item() == pytest.approx(146.67072, rel=1e-5)
-
-    @pytest.mark.slow
-    def test_contact_lost_where_no_mode_follows_jams_the_body_without_flight(self):
-        """Contact 2 alone has A_22 < 0 and no load, and without both contacts the gap of contact 1 would close."""
-        friction = {
-            "law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
-            "vb": 0.304904, "w": 0.0141684, "h": 0.558222,
-            "rest": {"mu_s": 1.26286, "mu_k": 1.01809}, "rough": {"mu_s": 0.349284, "mu_k": 0.00191046},
-        }  # fmt: skip
-        scene = (
-            shape(0.489069, 7.10457e-05, 0.0238336, 0.00874807, 0.0605306, zone=2.4754)
-            | course("power", -11.0615, 1.0, phi=0.0, omega=18.6091, e=0.721582)
-            | {"friction": friction}
-        )
-        found = ringsweep.sweep(scene, {"time.span": [0.5]}, progress=False)
-        assert ringsweep.words(found.regime).item() == "separating"
-        assert found.separating_contact.item() == 1
-        assert found.t_end.item() == found.t_separation.item() == pytest.approx(0.126876351, abs=1e-8)
-        assert found.flight_time.item() == 0.0
-
     def test_rounding_decides_nothing_at_the_end_of_rebounds(self):
         """The wedged body comes to rest, breaks away where friction does not fall, and jams in the end.
 
         Before it does, its rebounds end at speeds of 1e-8 m/s on a race of 0.6 m/s. Neighbours run as it does.
         """
-        friction = {"law": "stiction", "rough": {"mu_s": 0.366122, "mu_k": 0.366122}}
-        friction["rest"] = {"mu_s": 0.618378, "mu_k": 0.618378}
-        scene = BODY | {"friction": friction} | {"impact": {"restitution": 0.666}}
+        scene = BODY | rubs("stiction", rest=(0.618378, 0.618378), rough=(0.366122, 0.366122))
+        scene |= {"impact": {"restitution": 0.666}}
         amplitudes = 11.8722 + np.array([0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9])
         found = ringsweep.sweep(scene, {"drive.amplitude": amplitudes}, progress=False)
         assert ringsweep.words(found.aftermath).values.tolist() == ["tumbled"] * 6
@@ -618,18 +452,11 @@ class TestBody:
             "friction.rest.mu_k": [0.07331794609510014, 0.10905866041608533, 0.09870081894815391],
             "drive.amplitude": [11.389784962935275, 3.2236387068756627, 8.306229096530728],
         }
-        scene = BODY | {
-            "friction": {"law": "tustin", "alpha": 10} | {k: BODY["friction"][k] for k in ("rough", "rest")}
-        }
+        scene = BODY | {"friction": BODY["friction"] | {"law": "tustin", "alpha": 10}}
         found = ringsweep.sweep(
             scene, {path: xr.DataArray(each, dims="run") for path, each in points.items()}, progress=False
         )
         assert (found.t_end == 5.0).all()
-
-    def test_restitution_is_an_axis_and_the_greatest_gap_has_a_bound(self):
-        found = ringsweep.sweep(BODY, {"impact.restitution": [0.0, 0.3, 0.9]}, progress=False)
-        assert (found.gap_max <= 2 * (0.043378 - 0.008 - 0.0315) + 1e-9).all()
-        assert isinstance(found, xr.Dataset)
 
     @pytest.mark.slow
     def test_bounds_cover_the_errors_of_what_follows_a_loss(self):
@@ -651,6 +478,120 @@ class TestBody:
         assert min(len(each) for each in covered.values()) > 60
         assert np.concatenate(list(covered.values())).mean() > 0.99
         assert min(each.mean() for each in covered.values()) > 0.97
+
+
+def middle_of_impulses(side):
+    """Both contacts stick in an impact. Friction allows 0.0425668 to 0.0513271 N s, by a linear program."""
+    return (
+        shape(0.0916, 2.565e-5, 0.02, 0.00527, 0.0462, offset=0.0069, zone=0.3)
+        | rubs("stiction", rest=(0.558, 0.397), rough=(0.558, 0.397))
+        | course("sinusoidal", side * 1.976, 1.22, 0.425, phi=side * 0.675, span=3.3, e=0.0)
+    )
+
+
+def near(value, error):
+    return pytest.approx(value, abs=error)
+
+
+#: Runs whose words and numbers are known from ``benchmarks.reference`` or, where it is said, from elsewhere: scenes and
+#: outcomes. The first three share a kernel with other tests.
+KNOWN = {
+    # Without slip a ball on which the body pivots still rolls over the ring, onto the edge of a zone. There it slides
+    # against the direction in which it rolls.
+    "a ball rolls onto a smooth zone": (
+        shape(0.267278, 0.000496468, 0.0440407, 0.0191723, 0.0741464, zone=(2.86196, pi))
+        | rubs("stiction", rest=(0.576639, 0.327377), rough=(0.0175763, 0.00977993))
+        | course("arctan", 0.533024, omega=-20.1769, span=2.08644, e=0.599883),
+        {"aftermath": "tumbled", "t_end": 2.08644, "t_recovered": near(1.106471579, 1e-5)}
+        | {"phi_end": near(-3.365267361, 3e-6)},
+    ),
+    # When stick ends and no slip holds both contacts, one opens at once: the other ball must slide, not stick.
+    "a contact opens by its acceleration at breakaway": (
+        shape(0.364591, 0.000196867, 0.0193353, 0.00469679, 0.0315957, zone=(2.0, pi))
+        | rubs("stiction", rest=(0.223021, 0.166925), rough=(0.718786, 0.355663))
+        | course("arctan", -8.66607, phi=-1.08749, omega=22.8486, span=1.0, e=0.169101),
+        {"aftermath": "tumbled", "phi_end": near(-3.1472056528869796, 3e-9)},
+    ),
+    # Each impact at one contact brings the other one down, until both hold.
+    "contacts that rebound in turn close together": (
+        shape(0.34295, 0.00034546, 0.039532, 0.02979, 0.073942, zone=(2.0, pi))
+        | rubs("stiction", rest=(0.52646, 0.50751), rough=(0.69648, 0.4932))
+        | course("arctan", -2.8076, phi=2.8394, omega=2.8514, span=1.0, e=0.11094),
+        {"t_end": 1.0, "phi_end": near(1.9295466835627817, 2e-9)},
+    ),
+    # The body pivots on a contact that would enter the race if it opened.
+    "a reaction with a sign change at infinity jams": (
+        shape(0.475957, 4.73961e-06, 0.00424212, 0.0128909, 0.0420561, zone=(2.70773, pi))
+        | rubs("tustin", rest=(0.235758, 0.10485), rough=(0.48332, 0.267488), alpha=1702030.0)
+        | course("power", 8.84074, 1.53252, phi=2.84616, omega=89.1353, span=0.256649, e=0.0),
+        {"t_end": near(0.24783247, 1e-7)},
+    ),
+    # An impact at one contact while the other one holds need not have a solution with restitution. Among the last of
+    # unending rebounds, of 1e-8 m/s, the body closes and goes on.
+    "last rebounds that friction forbids close the contact": (
+        shape(0.213905, 6.69e-05, 0.0255529, 0.00972928, 0.0362977, zone=(1.03967, 2.16646))
+        | rubs("tustin", rest=(0.366641, 0.366641), rough=(0.00943182, 0.00778139), alpha=1702030.0)
+        | course("power", -6.43394, 2.20164, phi=1.03281, omega=0.0, span=1.2, e=0.7348),
+        {"t_end": 1.2, "gap_max": near(0.002025674, 1e-9)},
+    ),
+    # Three starts with infinite acceleration. Pushed off both contacts, the body stays at rest while the ring moves on.
+    "pushed off both contacts": (
+        shape(0.0622681, 4.35788e-05, 0.0263802, 0.0238993, 0.0987501, zone=(1.08239, 2.715))
+        | rubs("tustin", rest=(0.391247, 0.124068), rough=(0.521341, 0.26673), alpha=16.9413)
+        | course("power", 0.169772, 1.05595, phi=-2.75764, omega=0.0, span=0.924103, e=0.803551),
+        {"phi_end": near(-3.059077252, 1e-6)},
+    ),
+    "wedged on one contact, and taken along": (
+        shape(0.382064, 2.82698e-06, 0.00257343, 0.0165818, 0.0421444, zone=(2.85642, 1.33532))
+        | rubs("tustin", rest=(0.435147, 0.435147), rough=(0.333057, 0.0930198), alpha=20800.1)
+        | course("power", 9.3018, 1.71787, phi=1.22941, omega=0.0, span=2.59935, e=0.401576),
+        {"phi_end": near(2.351071097, 1e-6)},
+    ),
+    # Its contacts hit so nearly at once that friction forbids both impacts together, but not in turn.
+    "hit at both contacts in turn": (
+        shape(0.0947472, 4.42698e-07, 0.00433759, 0.0168983, 0.0427085, zone=(1.4492, pi))
+        | rubs("tustin", rest=(0.484993, 0.471637), rough=(0.0623722, 0.0607234), alpha=9.24635)
+        | course("power", -0.186147, 1.48619, phi=1.02004, omega=0.0, span=1.74251, e=0.772468),
+        {"phi_end": near(2.725634, 1e-6)},
+    ),
+    # Both impulses are 1e5 times the momentum. With 40 digits one of the 16 modes is admissible.
+    "an impact of a wedged body has its solution although impulses cancel": (
+        shape(0.149936, 8.98195e-05, 0.0274996, 0.00955871, 0.0375752, offset=0.00105183, zone=(0.153688, 0.333103))
+        | rubs("tustin", rest=(0.501325, 0.194777), rough=(0.103706, 0.103706), alpha=1859.76)
+        | course("power", 1.50143, 2.92213, phi=0.953257, omega=14.4442, span=0.659132, e=0.71469),
+        {"phi_end": near(1.83277839, 1e-8), "impulse_max": near(146.67072, 1.5e-3)},
+    ),
+    # Under the greater friction contact 2 would pull, and contact 1 alone would press itself into the race. So the body
+    # has no motion where friction jumps at the speed vb.
+    "a body without a motion at a jump of friction jams": (
+        shape(0.362325, 1.36913e-05, 0.0127683, 0.0244479, 0.0645043)
+        | rubs("formula", rest=(0.780949, 0.430834), vb=1.16804, **STEPPING)
+        | course("sinusoidal", 0.0, 1.0, phi=1.55313, omega=-22.6359, span=0.5, e=0.0641463),
+        {"regime": "jammed", "certified": 1, "omega_end": near(-1.16804 / 0.0645043, 2e-11)},
+    ),
+    # Contact 2 alone has A_22 < 0 and no load, and without both contacts the gap of contact 1 would close.
+    "a contact lost where no mode follows jams the body without flight": (
+        shape(0.489069, 7.10457e-05, 0.0238336, 0.00874807, 0.0605306, zone=2.4754)
+        | bump(rest=(1.26286, 1.01809), rough=(0.349284, 0.00191046), vb=0.304904, w=0.0141684, h=0.558222)
+        | course("power", -11.0615, 1.0, phi=0.0, omega=18.6091, span=0.5, e=0.721582),
+        {"regime": "separating", "separating_contact": 1, "t_end": near(0.126876351, 1e-8)}
+        | {"t_separation": near(0.126876351, 1e-8), "flight_time": 0.0},
+    ),
+    "greatest impulse": (
+        middle_of_impulses(1.0),
+        {"certified": 1, "impulse_max": near(0.0469470, 1e-7)},
+    ),
+    "greatest impulse, mirrored": (middle_of_impulses(-1.0), {"certified": 1, "impulse_max": near(0.0469470, 1e-7)}),
+}
+
+
+@pytest.mark.parametrize("name", mostly_slow(KNOWN, tuple(KNOWN)[:3]))
+def test_run_goes_on_as_it_is_known_to(name):
+    scene, outcomes = KNOWN[name]
+    found = ringsweep.sweep(scene, {"time.span": [scene["time"]["span"]]}, progress=False)
+    for variable, known in outcomes.items():
+        value = ringsweep.words(found[variable]) if isinstance(known, str) else found[variable]
+        assert value.item() == known, variable
 
 
 def thrown(rng):
@@ -728,28 +669,6 @@ class TestBothContactsStick:
                 assert stuck
                 np.testing.assert_allclose((n_2, -t_2, n_1, -t_1), found, rtol=1e-9, atol=1e-9 * found.max())
 
-    @pytest.mark.slow
-    @pytest.mark.parametrize("side", [1.0, -1.0])
-    def test_greatest_impulse_of_a_run_is_that_of_the_middle(self, side):
-        """Friction allows 0.0425668 to 0.0513271 N s, by a linear program over both cones."""
-        mu = {"mu_s": 0.558, "mu_k": 0.397}
-        scene = {
-            "model": "ring",
-            "body": {
-                "mass": 0.0916, "inertia": 2.565e-5, "half_distance": 0.02, "ball_radius": 0.00527,
-                "center_offset": 0.0069,
-            },
-            "ring": {"radius": 0.0462},
-            "friction": {"law": "stiction", "rest": mu, "rough": mu},
-            "zone": {"half_angle": 0.3},
-            "drive": {"law": "sinusoidal", "amplitude": side * 1.976, "frequency": 1.22, "phase": 0.425},
-            "initial": {"phi": side * 0.675},
-            "impact": {"restitution": 0.0},
-        }  # fmt: skip
-        found = ringsweep.sweep(scene, {"time.span": [3.3]}, progress=False)
-        assert found.certified.item() == 1
-        assert found.impulse_max.item() == pytest.approx(0.0469470, abs=1e-7)
-
 
 class TestRefused:
     @pytest.mark.parametrize(
@@ -797,7 +716,7 @@ def refined_map(config_of_map):
 
 
 class TestSweep:
-    """Sweeps over scenes with impacts are refined, verified and continued as all others are."""
+    """Sweeps over scenes with impacts are refined and verified as all others are."""
 
     @pytest.mark.slow
     def test_refined_map_follows_the_words_of_aftermath_within_one_regime(self, refined_map, full_map):
@@ -811,6 +730,10 @@ class TestSweep:
             wrong |= ds[name].values != full_map[name].values
         assert wrong.sum() <= ds.attrs["audit_bound"] * inferred.sum()
         assert wrong.mean() < 0.01
+        run = ~inferred
+        for name in full_map.data_vars:
+            expected = full_map[name].values[run]
+            assert ds[name].values[run].astype(expected.dtype).tobytes() == expected.tobytes(), name
         # Beside every boundary between two words both cells are computed, wherever the map is right.
         for axis in (0, 1):
             one, other = (np.moveaxis(ds.aftermath.values, axis, 0)[part] for part in (slice(1, None), slice(-1)))
@@ -819,14 +742,6 @@ class TestSweep:
             assert edge.any()
             assert run[1:][edge].all()
             assert run[:-1][edge].all()
-
-    @pytest.mark.slow
-    def test_computed_cells_of_a_refined_map_equal_the_full_grid_bit_for_bit(self, refined_map, full_map):
-        ds = netcdf.load(refined_map)
-        run = ds.origin.values != INFERRED
-        for name in full_map.data_vars:
-            expected = full_map[name].values[run]
-            assert ds[name].values[run].astype(expected.dtype).tobytes() == expected.tobytes(), name
 
     def test_last_bit_of_a_gap_is_verified(self, refined_map, tmp_path, capsys):
         assert cli.main(["verify", str(refined_map)]) == 0
@@ -837,12 +752,3 @@ class TestSweep:
             file["gap_max"][at] = np.nextafter(gaps[at], 1.0)
         assert cli.main(["verify", str(changed)]) == 2
         assert "seal" in capsys.readouterr().err
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("count", [2, 9])
-    def test_killed_sweep_continues_to_the_same_bits(self, config_of_map, refined_map, tmp_path, count):
-        arguments = ["run", str(config_of_map), "-o", str(tmp_path / "out.nc")]
-        point = "after a rename" if count == 2 else "merge"
-        assert killed_at(point, count, arguments).returncode == -9
-        assert cli.main(arguments) == 0
-        assert same_bits(tmp_path / "out.nc", refined_map)
