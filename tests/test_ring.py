@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from solutions import ball, made, rod
 
 from ringsweep.compile import kernel, take
-from ringsweep.errors import InputError
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface.constant_step import inspect
 from ringsweep.physics import ring
@@ -93,15 +92,6 @@ class TestTwoContactBalances:
         assert abs(N1 - M * first / D) < 1e-12 * scale
         assert abs(N2 - M * second / D) < 1e-12 * scale
 
-    @given(states())
-    def test_power_of_friction_is_the_rate_of_energy(self, state):
-        body, K1, K2, phi, omega = state
-        epsilon, N1, N2 = motion(*state)
-        inertia = body.inertia + body.mass * body.xi**2
-        rate = inertia * omega * epsilon + body.mass * body.gravity * body.xi * sin(phi) * omega
-        power = body.radius * omega * (K1 * N1 + K2 * N2)
-        assert abs(rate - power) < 1e-12 * force_scale(body, omega, epsilon, N1, N2) * body.radius * (1 + abs(omega))
-
     @given(two_contacts(), angles, lifts)
     def test_without_friction_the_body_is_a_pendulum(self, body, phi, lift):
         M, xi, g = body.mass, body.xi, body.gravity
@@ -134,13 +124,6 @@ class TestDeclaredBalances:
         found = solution(*state)
         assert abs(found[0] - epsilon) * state[0].mass * state[0].radius < 1e-9 * scale
         assert np.abs(found[1:] - [N1, N2]).max() < 1e-9 * scale
-
-    @given(friction_ratios, angles, st.floats(-50.0, 50.0))
-    def test_solution_of_one_contact_solves_the_declared_balances(self, K, phi, omega):
-        body = ball(0.3, 0.2, 9.81)
-        np.testing.assert_allclose(
-            solution(body, K, 0.0, phi, omega), motion(body, K, 0.0, phi, omega)[:2], rtol=1e-9, atol=1e-9
-        )
 
     @given(states(), st.floats(-1e-3, 1e-3))
     def test_audit_sees_a_wrong_reaction(self, state, share):
@@ -289,13 +272,6 @@ class TestSlope:
         scale = (abs(epsilon) + body.gravity / body.radius + omega**2) * body.mass * body.radius**2 / abs(determinant)
         assert abs(slope - complex_step) < 1e-12 * scale * (1 + body.mass * body.radius**2 / abs(determinant))
 
-    @given(lifts, friction_ratios, angles, st.floats(-1.0, 1.0))
-    def test_acceleration_slope_of_one_contact_is_the_derivative(self, lift, K, phi, slope):
-        body = ball(0.1, 0.05, 9.81)
-        where = (sin(phi), cos(phi), (lift * 9.81 / 0.05) ** 0.5)
-        complex_step = acceleration(body, K + 1e-40j * slope, 0.0, where)[0].imag / 1e-40
-        assert acceleration_slope(body, K, 0.0, slope, 0.0, where) == pytest.approx(complex_step, rel=1e-12)
-
 
 class TestOneContact:
     @given(friction_ratios, angles, st.floats(-50.0, 50.0))
@@ -365,19 +341,6 @@ class TestGeometry:
         # Without friction it is a longer pendulum.
         M, J, xi, g = beside.mass, beside.inertia, beside.xi, beside.gravity
         assert motion(beside, 0.0, 0.0, 1.0, 2.0)[0] == pytest.approx(-M * g * xi / (J + M * xi**2) * sin(1.0))
-
-    @pytest.mark.parametrize(
-        ("changes", "message"),
-        [
-            ({"ring.radius": 0.0349}, r"ring\.radius.*0\.0349 m is too small"),
-            ({"body.beta": radians(48.0)}, r"body\.beta.*contradicts ring\.radius"),
-            ({"ring.radius": None}, r"ring\.radius.*missing"),
-            ({"friction.rough.mu_k": 0.6}, r"friction\.rough\.mu_k.*0\.6 exceeds mu_s"),
-        ],
-    )
-    def test_contradictory_geometry_is_an_input_error(self, cells, changes, message):
-        with pytest.raises(InputError, match=message):
-            cells(changes)
 
 
 def _friction(scene, phi, omega, theta, ring_omega):
