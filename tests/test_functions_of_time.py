@@ -16,7 +16,6 @@ from ringsweep.models import batch
 from ringsweep.numerics.writer import SERIES_ROWS
 from ringsweep.physics import drives
 from ringsweep.quantities.parameters import declared
-from ringsweep.solvers.rk4 import _groups_by_drive
 
 #: Drives in the documentation.
 EXAMPLES = [
@@ -113,14 +112,6 @@ class TestDerived:
             np.testing.assert_allclose(series_of(b, t), expected, rtol=1e-11, atol=1e-14 * abs(expected).max())
         assert drives.period(b) == pytest.approx(drives.period(a))
 
-    @pytest.mark.slow
-    def test_runs_under_such_formulas_are_the_runs_of_the_package(self):
-        axes = {"initial.omega": np.linspace(-1.0, 1.0, 9)}
-        for known, formula in ALIKE.values():
-            a, b = (ringsweep.sweep(ring(d), axes, solver=RK4, progress=False) for d in (known, formula))
-            np.testing.assert_allclose(b.phi_end, a.phi_end, rtol=1e-9)
-            assert (a.regime == b.regime).all()
-
     @pytest.mark.parametrize(
         "text",
         [
@@ -151,12 +142,6 @@ class TestDerived:
         factorials = radius ** -np.arange(4.0) * [1, 1, 2, 6]
         found = [*drives.turn(drive, t), drives.jerk(drive, t)]
         np.testing.assert_allclose(found, expected[:4] * factorials, rtol=1e-11)
-
-    def test_cells_with_one_shape_share_its_table_whatever_their_factor_is(self):
-        scene = ring(by("-2*A*(t - tau*(1 - exp(-t/tau)))", A=1.0, tau=1.0))
-        cells = cells_of(scene, drive__A=[1.0, 2.0, 3.0, 1.0], drive__tau=[1.0, 1.0, 1.0, 2.0])
-        assert [len(group) for group in _groups_by_drive(cells, np.arange(4))] == [3, 1]
-        assert drives.without_shape(cells.drive).amplitude.tolist() == [-2.0, -4.0, -6.0, -2.0]
 
     @pytest.mark.slow
     def test_documented_examples_run_and_their_parameters_can_be_swept(self):
