@@ -3,7 +3,6 @@
 import json
 import os
 import re
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -20,7 +19,7 @@ from PIL import Image
 from ringsweep import plots
 from ringsweep.errors import InputError
 from ringsweep.quantities.flags import REGIMES
-from ringsweep.quantities.variables import HISTORY, OUTCOMES, words
+from ringsweep.quantities.variables import HISTORY, OUTCOMES
 
 DRIVE = {"units": "rad s-1", "long_name": "amplitude of the drive"}
 ANGLE = {"units": "rad", "long_name": "half-angle of the zone"}
@@ -385,18 +384,6 @@ def test_cells_beyond_the_stability_limit_have_another_hatch():
     assert entries(figure)[-1] == "not certified: step beyond stability limit, 30.0 %"
 
 
-def test_hatching_of_a_large_map_is_one_patch_for_each_colour(tmp_path, monkeypatch):
-    """So its cost does not grow with a patch for each of a hundred thousand cells."""
-    ds = make_sweep((512, 512))
-    ds["certified"][:] = np.random.default_rng(0).integers(0, 2, (512, 512))
-    # It visits every vertex in Python.
-    monkeypatch.setattr("matplotlib.axes.Axes.add_patch", lambda *arguments: pytest.fail("add_patch is slow"))
-    figure = plots.regime_map(ds)
-    patches = [patch for patch in figure.axes[0].patches if patch.get_hatch()]
-    assert sorted(patch.get_edgecolor()[:3] for patch in patches) == [(0.0, 0.0, 0.0), (1.0, 1.0, 1.0)]
-    plots.save(figure, tmp_path / "map.png")
-
-
 def test_notebook_shows_a_picture_without_the_inline_magic():
     assert plots.history(make_history())._repr_png_().startswith(b"\x89PNG")
 
@@ -406,12 +393,6 @@ def test_axes_are_saved_with_their_figure(tmp_path):
     for name, what in (("figure.png", figure), ("axes.png", figure.axes[0])):
         plots.save(what, tmp_path / name)
     assert (tmp_path / "axes.png").read_bytes() == (tmp_path / "figure.png").read_bytes()
-
-
-def test_share_of_a_regime_has_no_label_of_a_regime():
-    share = (words(make_sweep()["regime"]) == "separating").mean("drive_amplitude").rename("share that separates")
-    (line,) = share.plot(ax=panel())
-    assert line.axes.get_ylabel() == "share that separates"
 
 
 def test_map_axis_may_have_a_single_value():
@@ -484,13 +465,6 @@ def test_value_of_the_dataset_needs_no_warning_and_may_have_a_unit(value, caplog
     figure = plots.regime_map(make_sweep((12, 9)), sel={"zone.half_angle": value})
     assert not caplog.messages
     assert re.search("half-angle of the zone = (2|60)°$", title(figure))
-
-
-def test_colour_bar_of_a_count_has_whole_numbers():
-    ds = make_sweep().assign(reversals=(("drive_amplitude", "zone_half_angle"), np.arange(108).reshape(12, 9) % 4))
-    figure = plots.regime_map(ds, var="reversals")
-    figure.draw_without_rendering()
-    assert all(tick == round(tick) for tick in figure.axes[1].get_yticks())
 
 
 def test_further_dimensions_become_panels_with_one_colour_scale():
@@ -583,40 +557,6 @@ class TestPaper:
         assert figure.get_figwidth() == pytest.approx(width / 25.4)
         assert_readable(figure)
 
-    def test_title_of_a_map_of_origins_has_two_lines_in_a_column(self):
-        ds = refined_sweep()
-        ds.attrs |= {"audit_bound": 0.00871, "audit_cells": 20, "cells_computed": int((ds["origin"] != 1).sum())}
-        plots.style("print", width=85)
-        text = title(plots.regime_map(ds, var="origin"))
-        assert text.count("\n") <= 1
-        assert "≤ 0.88 % wrong (95 % confidence)" in text
-
-    def test_long_label_of_an_error_is_folded_within_one_column(self):
-        plots.style("print", width=85)
-        work = make_work(methods=20)
-        work["error_end"].attrs["long_name"] = "error of the angle of the body at the end"
-        figure = plots.work_precision(work)
-        figure.draw_without_rendering()
-        (ax,) = figure.axes
-        label, frame = ax.yaxis.label.get_window_extent(), ax.get_window_extent()
-        assert frame.y0 < label.y0 < label.y1 < frame.y1
-
-    @pytest.mark.parametrize("var", ["regime", "t_separation"])
-    def test_two_map_panels_fit_into_one_figure(self, var):
-        figure = Figure(figsize=(7, 3), layout="constrained")
-        for ax in figure.subplots(1, 2):
-            plots.map_panel(named_sweep((5, 5, 2)), var=var, sel={"friction.rough.mu_k": 0.5}, ax=ax)
-        assert_readable(figure)
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("picture", PICTURES)
-    def test_legends_are_no_smaller_than_ticks(self, picture):
-        figure = PICTURES[picture]()
-        figure.draw_without_rendering()
-        ticks = [label for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for label in axis.get_ticklabels()]
-        least = min(text.get_fontsize() for legend in legends(figure) for text in legend.get_texts())
-        assert least >= max(label.get_fontsize() for label in ticks)
-
     @pytest.mark.slow
     def test_title_and_legend_of_a_map_can_be_replaced_placed_and_left_out(self):
         for draw in (plots.regime_map, lambda ds, **options: plots.map_panel(ds, ax=panel(), **options).figure):
@@ -632,13 +572,6 @@ class TestPaper:
                 assert (box.x0 > ax.x1, box.y1 < ax.y0) == (place == "beside", place == "below")
             with pytest.raises(InputError, match=r"legend: 'nowhere'.*below.*upper left"):
                 draw(make_sweep(), legend="nowhere")
-
-    def test_small_multiples_have_a_title_and_a_legend_or_not(self):
-        ds = make_sweep((4, 4, 2))
-        (legend,) = plots.regime_map(ds).legends
-        assert legend.get_title().get_text() == "regime of the run"
-        plain = plots.regime_map(ds, title="my maps", legend=False)
-        assert (plain.get_suptitle(), plain.legends) == ("my maps", [])
 
     def test_numbers_in_pictures_have_true_minus_signs(self):
         ds = make_sweep((12, 9, 2)).assign_coords(friction_rough_mu_k=[-2e-6, 0.1])
@@ -687,19 +620,6 @@ class TestStyle:
                 lighter, darker = sorted((luminance(colour), page), reverse=True)
                 least = 1.1 if isinstance(artist, Line2D) and artist.get_linewidth() < 0.7 else 2.0
                 assert (lighter + 0.05) / (darker + 0.05) > least, (artist, colour)
-
-    def test_saved_picture_has_the_page_of_its_style(self, tmp_path):
-        for name, corner in (("light", (255, 255, 255, 255)), ("dark", (30, 30, 30, 255)), ("transparent", None)):
-            plots.style(name)
-            for draw, ds in (
-                (plots.regime_map, make_sweep()),
-                (plots.history, make_history(50)),
-                (plots.work_precision, make_work()),
-            ):
-                plots.save(draw(ds), tmp_path / "map.png")
-                with Image.open(tmp_path / "map.png") as picture:
-                    pixel = picture.convert("RGBA").getpixel((0, 0))
-                    assert pixel == corner if corner else pixel[3] == 0
 
     def test_print_style_has_text_of_eight_points_and_fine_dots(self, tmp_path):
         plots.style("print", width=85)
@@ -943,17 +863,6 @@ class TestWorkPrecision:
         np.testing.assert_allclose(tops, ds["error_end"].max("cell"))
         assert axes.get_ylabel() == "error (rad)"
 
-    def test_method_has_the_same_colour_whatever_it_is_compared_with(self):
-        colours = []
-        for names in (["rk4"], ["event", "rk4"], ["implicit", "rk4", "heyoka"]):
-            ds = make_work(len(names))
-            ds["method"] = "contender", np.repeat(names, 4)
-            axes = plots.work_precision(ds).axes[0]
-            colours.append({line.get_label(): line.get_color() for line in axes.lines})
-        assert len({found["rk4"] for found in colours}) == 1
-        all_methods = plots.work_precision(make_work(13)).axes[0].lines
-        assert len({line.get_color() for line in all_methods if "method" in str(line.get_label())}) == 13
-
     def test_zero_error_lies_on_a_floor_and_failure_on_a_ceiling(self):
         ds = make_work(1)
         ds["error_end"][3], ds["error_end"][0] = 0.0, np.inf
@@ -967,13 +876,6 @@ class TestWorkPrecision:
         assert words == ["method 0", "no error (at the floor)", "failed (at the ceiling)"]
         ds["error_end"][:] = 0.0
         assert (plots.work_precision(ds).axes[0].lines[0].get_ydata() > 0.0).all()
-
-    def test_errors_of_runs_that_diverged_do_not_stretch_the_axis(self):
-        ds = make_work(1)
-        ds["error_end"][0] = 1e150
-        axes = plots.work_precision(ds).axes[0]
-        assert axes.get_ylim()[1] < 1e5
-        assert axes.get_legend().get_texts()[-1].get_text() == "failed or diverged (at the ceiling)"
 
     def test_missing_errors_are_ignored_and_a_method_without_any_is_not_drawn(self):
         ds = make_work(2)
@@ -998,30 +900,6 @@ class TestWorkPrecision:
         assert hollow == (ds["regime_wrong"] == 1).any("cell").sum()
         (ring,) = (line for line in axes.lines if line.get_markerfacecolor() == "none" and line.get_markersize() > 10)
         np.testing.assert_array_equal(ring.get_xdata(), [ds["time_per_run"].values[6]])
-
-
-@pytest.mark.slow
-class TestBenchmarks:
-    """Pictures of the stored results of the benchmarks."""
-
-    RESULTS = Path(__file__).parents[1] / "benchmarks" / "results"
-
-    def test_maps_that_are_right_everywhere_are_named_and_not_drawn(self, tmp_path, monkeypatch):
-        from benchmarks.stability import CLASSES, maps, picture
-
-        drawn = []
-        monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
-        ds = xr.load_dataset(self.RESULTS / "stability.nc")
-        picture(ds, maps(quick=False), tmp_path / "stability.png")
-        (figure,) = drawn
-        wrong = [one.name for one in maps(quick=False) if (ds[f"{one.name}_class"] > CLASSES.index("right")).any()]
-        assert len([axes for axes in figure.axes if axes.get_title()]) == len(wrong)
-        said = " ".join(entries(figure))
-        assert "right in every cell, so not drawn: auto," in said
-        assert "wrong and silent: certified; regime right, error above 0.001" in said
-        assert "beyond the limit of stability" in said
-        assert "without dots: within it" in said
-        assert_readable(figure)
 
 
 def test_suffix_decides_the_format_of_a_saved_figure(tmp_path):
