@@ -243,41 +243,10 @@ class TestPicture:
             "tustin: stick-slip",
         ]
 
-    def test_legend_of_compared_laws_covers_no_panel(self, compared):
-        figure = plots.history(compared)
-        figure.draw_without_rendering()
-        legend = figure.legends[0].get_window_extent()
-        assert not any(legend.overlaps(axes.get_window_extent()) for axes in figure.axes)
-
-    def test_comparison_of_one_law_is_drawn_as_a_single_run(self, compared):
-        figure = plots.history(compared.isel(friction_law=[1]))
-        assert not figure.legends
-        assert figure.axes[0].collections
-
     def test_lines_of_nine_laws_look_different(self, compared):
         many = compared.isel(friction_law=[0, 1, 2] * 3).assign_coords(friction_law=list("abcdefghi"))
         lines = plots.history(many).axes[0].lines
         assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 9
-
-    def test_panel_of_the_start_is_twice_as_long_as_the_first_differences(self, compared):
-        """Under law `tustin` the body sticks to the belt first. Then all stick until the first breakaway."""
-        caught = 0.1 / (0.1 * 9.81)
-        start, end = plots.history(compared).axes[3].get_xlim()
-        assert start == 0.0
-        assert end == pytest.approx(2 * caught, rel=0.05)
-        force = compared.friction_force.sel(time=slice(caught * 1.05, end))
-        assert float((force.max("friction_law") - force.min("friction_law")).max()) < 0.02
-
-    def test_force_of_one_law_at_the_start_does_not_flatten_the_others(self, compared):
-        """Bristles may push with 31 N for a moment, where all other forces are below 1.5 N."""
-        spike = xr.where((compared.time < 0.02) & (compared.friction_law == "tustin"), -30.0, 0.0)
-        ds = compared.assign(friction_force=compared.friction_force + spike.transpose(*compared.friction_force.dims))
-        for axes in plots.history(ds).axes[2:4]:
-            low, high = axes.get_ylim()
-            assert -2.5 < low < -1.4
-            assert 0.0 < high < 1.0
-            said = axes.get_title(loc="right") or axes.get_title(loc="left")
-            assert "axis clipped; values from \N{MINUS SIGN}3" in said
 
     def test_last_panel_shows_the_first_breakaway_of_each_law_at_one_place(self, compared):
         detail = plots.history(compared).axes[-1]
@@ -297,20 +266,6 @@ class TestPicture:
         figure = plots.history(compared.sel(friction_law="stiction"))
         period = float(compared.period.sel(friction_law="stiction"))
         assert figure.get_suptitle().startswith(f"stiction: stick-slip, t = 20 s, period {period:.6g} s")
-
-    def test_transients_of_two_time_scales_have_a_logarithmic_axis(self, compared):
-        time = np.concatenate([np.linspace(0, 1e-3, 1000), np.linspace(2e-3, 10, 20_000)])
-        bristle = 1 - np.exp(-time / 1e-4) + np.where(time > 0.1, np.exp(-5 * (time - 0.1)) * np.sin(200 * time), 0)
-        force = ("friction_law", "time"), np.array([np.ones_like(time), bristle]), compared.friction_force.attrs
-        ds = xr.Dataset(
-            dict.fromkeys(("x", "velocity", "friction_force"), force),
-            coords={"time": ("time", time, compared.time.attrs), "friction_law": ["rigid", "bristle"]},
-        )
-        detail = plots.history(ds).axes[-1]
-        assert detail.get_xscale() == "log"
-        start, end = detail.get_xlim()
-        assert start < 5e-5
-        assert 0.5 < end < 2.0
 
 
 class TestCommands:
