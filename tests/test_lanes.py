@@ -11,8 +11,6 @@ from tiers import mostly_slow
 
 from ringsweep.compile import kernel, take
 from ringsweep.models import MODELS
-from ringsweep.models.interface import constant_step, recorder
-from ringsweep.models.interface.status import COMPLETE, RUNNING
 from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.numerics.functions import (
     any_of,
@@ -25,11 +23,9 @@ from ringsweep.numerics.functions import (
 )
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import conform, read_lanes, side_by_side, write
-from ringsweep.physics.drives import lookup
-from ringsweep.physics.friction import LAWS, Dynamic, SetValued, coefficients_of, family_of
+from ringsweep.physics.friction import LAWS, Dynamic, coefficients_of, family_of
 from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.physics.friction.velocity import friction_at, steepest, stiction_band
-from ringsweep.quantities.flags import SEPARATING
 from ringsweep.quantities.parameters import declared
 from ringsweep.solvers import rk4
 from ringsweep.solvers.rk4 import RK4
@@ -119,11 +115,6 @@ def test_eigenvalue_of_a_matrix_counts_where_it_exceeds_the_largest_so_far(trace
         assert larger_eigenvalue(most, trace, determinant) == pytest.approx(max(most, largest), rel=1e-7)
     # The first step may jump over a discontinuity.
     assert larger_eigenvalue(0.0, inf, determinant) == inf
-
-
-def test_generated_function_called_in_python_raises_type_error():
-    with pytest.raises(TypeError, match="write can only be called in a kernel"):
-        write(np.empty(1), 0, 1, (0.0,))
 
 
 #: Laws as formulas, with functions and switches that no law of the package has.
@@ -219,80 +210,28 @@ def family(cells, model="ring", law="bengisu-akay", count=40):
     return cells(values, drive="arctan", model=model, law=law)
 
 
-@kernel
-def _serial(batch, launches, table, stretch, results):
-    """Outcomes of all cells by floats, one by one; `table` holds the drive for the whole span."""
-    _, steps, h, _ = stretch
-    for cell in range(len(results.rows)):
-        scene = take(batch, cell)
-        y, now, record, diagnosis, live = rk4._initial_run(batch, launches, cell, table)
-        status, fraction = constant_step.verdict(scene, now, now)
-        k, t, fall_rate = 0, 0.0, 0.0
-        while status == RUNNING and k < steps:
-            y_next = rk4._step(scene, y, now, table, 2 * k, h)
-            after = constant_step.inspect(scene, y_next, lookup(scene.drive, table, 2 * k + 2))
-            status, fraction = constant_step.verdict(scene, now, after)
-            least = diagnosis.margin
-            diagnosis = rk4._diagnose(rk4.Diagnosed(), scene, diagnosis, now, after, h)
-            if status != RUNNING:
-                y_next = rk4._hermite(y, now.rates, y_next, after.rates, h, fraction)
-                diagnosis = rk4.Diagnosis(diagnosis.eigenvalue, least, diagnosis.arc_share)
-                fall_rate = constant_step.fall_rate(scene, now, after, h)
-            t, duration = (k + fraction) * h, fraction * h
-            stuck, seen = constant_step.sticks(scene, now, after), constant_step.seen(scene, y_next, after)
-            record = recorder.observe(scene, record, t, duration, stuck, seen)
-            y, now, k = y_next, after, k + 1
-        if status == RUNNING:
-            status, t = COMPLETE, scene.span
-        run, end = rk4._Run(y, now, record, diagnosis, live), rk4._End(status, t, float(k), fall_rate)
-        rk4._conclude(scene, run, end, h, cell, results)
-
-
-def integrate(batch, steps, names, *, order=None, serial=False):
-    """Outcomes of the cells of a batch, side by side in a given order, or one by one."""
-    cells, drive = len(batch.span), take(batch.drive, 0)
-    order = np.arange(cells) if order is None else order
+def integrate(batch, steps, names, *, order=None):
+    """Outcomes of the cells of a batch, side by side in a given order."""
+    cells = len(batch.span)
     results = rk4.Results(np.empty((cells, len(names))), np.empty((cells, 5)))
-    scenes, launches = rk4.prepare(batch)
-    if serial:
-        table, stretch = np.empty((2 * steps + 1, 2)), rk4._Stretch(0, steps, float(batch.span[0]) / steps, True)
-        rk4._tabulate(table, drive, stretch)
-        _serial(scenes, launches, table, stretch, results)
-    else:
-        rk4.integrate(rk4.Diagnosed(), scenes, launches, drive, order, steps, results)
+    order = np.arange(cells) if order is None else order
+    rk4.integrate(rk4.Diagnosed(), *rk4.prepare(batch), take(batch.drive, 0), order, steps, results)
     columns = zip(("steps", "stiffness", "slack", "fall", "stride"), results.report.T, strict=True)
     return dict(zip(names, results.rows.T, strict=True)) | dict(columns)
 
 
 class TestEachLane:
     @pytest.mark.parametrize(("model", "law"), mostly_slow(SCENES, [("ring", "bengisu-akay")]))
-    def test_run_side_by_side_agrees_with_the_single_run_despite_neighbours(self, cells, model, law):
-        """Neighbours must not change a bit. Where friction jumps, rounding may move a jump by a step."""
-        share = 1e-2 if family_of(LAWS[law]) is SetValued else 1e-9
+    def test_neighbours_of_a_run_change_no_bit_of_it(self, cells, model, law):
         batch, names = family(cells, model, law), MODELS[model].outcomes
         together = integrate(batch, 6000, names)
-        alone = integrate(batch, 6000, names, serial=True)
-        for name in alone:
-            scale = np.nanmax(np.abs(alone[name]), initial=1.0, where=np.isfinite(alone[name]))
-            np.testing.assert_allclose(together[name], alone[name], rtol=0, atol=share * scale, err_msg=name)
-        for name in ("regime", "motion", "separating_contact", "reversals", "turns", "slips", "steps"):
-            if name in alone:
-                np.testing.assert_array_equal(together[name], alone[name])
+        assert len(set(together["regime"])) > 1 or model != "ring"
         shuffled = integrate(batch, 6000, names, order=np.random.default_rng(1).permutation(len(batch.span)))
         single = {i: integrate(take(batch, [i]), 6000, names) for i in (0, 17, 39)}
         for name in together:
             np.testing.assert_array_equal(shuffled[name], together[name], err_msg=name)
             for i, one in single.items():
                 np.testing.assert_array_equal(one[name][0], together[name][i], err_msg=name)
-
-    @pytest.mark.slow
-    def test_runs_of_the_family_slip_stick_and_oscillate(self, cells):
-        found = integrate(family(cells, "belt"), 6000, MODELS["belt"].outcomes)
-        assert found["slips"].max() > 1
-        assert len(set(found["regime"])) > 1
-        found = integrate(family(cells), 6000, NAMES)
-        assert found["reversals"].max() > 1
-        assert SEPARATING in found["regime"]
 
 
 @pytest.mark.slow
