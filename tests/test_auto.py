@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import RIG
 from scipy.special import ellipk
-from solutions import HISTORY, Fall, solve
+from solutions import Fall, solve
 
 from ringsweep.compile import take
 from ringsweep.models import batch, parameters
@@ -61,13 +61,6 @@ class TestChoice:
             auto, direct = solve(Auto(), scene), solve(method, scene)
             np.testing.assert_array_equal(auto.rows, direct.rows)
             np.testing.assert_array_equal(auto.steps, direct.steps)
-
-    def test_history_of_auto_equals_that_of_the_method_that_takes_the_law(self, scenes, law):
-        scene = scenes({"drive.amplitude": 2.0})
-        direct = Event() if law == "stiction" else Implicit()
-        (times, rows), expected = (method.history(scene, 100, len(HISTORY)) for method in (Auto(), direct))
-        np.testing.assert_array_equal(times, expected[0])
-        np.testing.assert_array_equal(rows, expected[1])
 
 
 class TestCertificate:
@@ -150,6 +143,8 @@ class TestCertificate:
         found = solve(method, scenes({"drive.amplitude": np.array([2.0, 5.0])}))
         np.testing.assert_array_equal(found.regime, FAILED)
         np.testing.assert_array_equal(found.motion, FAILED)
+        # All runs of a cell together take so many.
+        assert (found.steps <= 10).all()
         assert not found.certified.any()
         assert (found.because == NO_RESULT).all()
 
@@ -332,13 +327,6 @@ class TestTime:
         assert found.certified
         assert 500 < found.reversals < 2000
         assert 0.9e4 < found.stick_time < 1e4
-
-    def test_run_of_more_than_a_million_steps_is_computed(self, cells):
-        """The ring carries the body up and drops it, thousands of times."""
-        found = solve(Auto(certify=False), cells({"drive.amplitude": 0.7, "time.span": 1.5e4}, drive="arctan"))
-        assert found.steps > 1e6
-        assert found.t_end == 1.5e4
-        assert found.regime == OSCILLATORY
 
     @pytest.mark.slow
     @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
