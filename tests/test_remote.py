@@ -40,9 +40,8 @@ def cluster():
 
 
 @pytest.mark.slow
-def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, tmp_path, monkeypatch):
-    axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 12), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 10))}
-    ringsweep.sweep(scene, axes, tmp_path / "threads.nc", progress=False).close()
+def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, by_threads, tmp_path, monkeypatch):
+    axes, path = by_threads
     monkeypatch.setattr(TaskSizes, "max_cells", 4)
     put, killed = Checkpoint.put, []
 
@@ -55,18 +54,7 @@ def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, tmp_path
     monkeypatch.setattr(Checkpoint, "put", kill_one)
     ringsweep.sweep(scene, axes, tmp_path / "dask.nc", scheduler=cluster.scheduler_address, progress=False).close()
     assert killed
-    assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
-
-
-@pytest.mark.slow
-def test_workers_of_a_scheduler_find_the_same_impacts_as_threads(cluster, scene, tmp_path):
-    falls = scene | {"impact": {"restitution": 0.5}}
-    axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 6), "zone.half_angle": np.radians([10.0, 30.0])}
-    by_threads = ringsweep.sweep(falls, axes, tmp_path / "threads.nc", progress=False)
-    assert len(np.unique(by_threads.aftermath)) > 1
-    by_threads.close()
-    ringsweep.sweep(falls, axes, tmp_path / "dask.nc", scheduler=cluster.scheduler_address, progress=False).close()
-    assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
+    assert same_bits(path, tmp_path / "dask.nc")
 
 
 @pytest.fixture(scope="module")
