@@ -1,5 +1,30 @@
 """Scenes of a body in a ring, each from one line of numbers (SI) for its shape, its friction and its course."""
 
+#: A configuration as it is typed: the scene of the paper's Fig. 29.
+TYPED = """\
+scene:
+  model: ring
+  body: {mass: 0.076 kg, inertia: 4.47e-5 kg m^2, half_distance: 25 mm, ball_radius: 10 mm}
+  ring: {radius: 43.378 mm}
+  friction:
+    law: bengisu-akay
+    rough: {mu_s: 0.5, mu_k: 0.3}
+    rest: {mu_s: 0.2, mu_k: 0.1}
+    alpha: 1.0e5
+    v0: 2.0e-6
+  zone:
+    half_angle: 15 deg
+  drive:
+    law: arctan
+    amplitude: 2.0
+  time: {span: 10}
+solver: {method: rk4, steps: 1000}
+sweep:
+  grid:
+    drive.amplitude: {geomspace: [0.1, 10, 5]}
+    zone.half_angle: [2 deg, 0.5]
+"""
+
 #: Names of the numbers of a drive behind its amplitude.
 _NUMBERS = {"power": ("exponent",), "sinusoidal": ("frequency", "phase")}
 
@@ -8,13 +33,23 @@ def _without(given):
     return {name: value for name, value in given.items() if value is not None}
 
 
+def _zone(zone):
+    half_angle, center = zone if isinstance(zone, tuple) else (zone, None)
+    arc = _without({"half_angle": half_angle, "center": center})
+    return {"zone": arc} if arc else {}
+
+
+def particle(mass, radius, *, zone=None):
+    """Body with one contact, ring, and a zone as in :func:`shape`."""
+    return {"model": "ring-single-contact", "body": {"mass": mass}, "ring": {"radius": radius}} | _zone(zone)
+
+
 def shape(mass, inertia, half_distance, ball_radius, radius, *, offset=None, zone=None):
     """Body with two balls, ring, and a zone: its half-angle, or half-angle and center."""
     body = {"mass": mass, "inertia": inertia, "half_distance": half_distance, "ball_radius": ball_radius}
-    half_angle, center = zone if isinstance(zone, tuple) else (zone, None)
-    arc = _without({"half_angle": half_angle, "center": center})
-    parts = {"model": "ring", "body": body | _without({"center_offset": offset}), "ring": {"radius": radius}}
-    return parts | ({"zone": arc} if arc else {})
+    return {"model": "ring", "body": body | _without({"center_offset": offset}), "ring": {"radius": radius}} | _zone(
+        zone
+    )
 
 
 def rubs(law, rest, rough=None, **parameters):

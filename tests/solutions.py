@@ -8,6 +8,8 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from ringsweep.compile import take
+from ringsweep.config import load
+from ringsweep.models import batch
 from ringsweep.models.ring.record import Outcome
 from ringsweep.physics import ring
 from ringsweep.physics.friction.speeds import hidden_fields
@@ -20,6 +22,12 @@ def made(law, surfaces=((0.5, 0.3),), motion=0.0, **parameters):
     columns = {name: np.array([float(value)]) for name, value in parameters.items()}
     pairs = [tuple(np.array([float(mu)]) for mu in pair) for pair in surfaces]
     return take(law(**columns, **hidden_fields(EXPRESSIONS[law], columns, pairs, motion)), 0)
+
+
+def cell_of(scene):
+    """The only cell of a scene: each field is a number, or an array of it."""
+    found = load({"scene": scene}).scene
+    return take(batch(found.structure, {path: np.array([value]) for path, value in found.values.items()}), 0)
 
 
 def rod(mass, inertia, radius, xi, sin_beta, cos_beta, gravity):
@@ -37,6 +45,23 @@ def solve(method, batch):
     """Outcomes of a batch: one array for each outcome, and the fields of `Result`."""
     result = method.run(batch, Outcome._fields)
     return SimpleNamespace(**vars(result), **dict(zip(Outcome._fields, result.rows.T, strict=True)))
+
+
+def growth(ends, state, weight, periods, distance):
+    """Logarithms of the growth of a disturbance in each period, of shape ``(periods, cells)``.
+
+    Neighbouring runs are brought together again after each period. `ends` returns the states of all runs after a period
+    from their states before it, of shape ``(2, runs)``; a length counts `weight` times as much as a velocity.
+    """
+    cells, found = state.shape[1], []
+    apart = np.array([np.full(cells, distance), np.zeros(cells)])
+    for _ in range(periods):
+        both = ends(np.hstack([state, state + apart]))
+        state, apart = both[:, :cells], both[:, cells:] - both[:, :cells]
+        length = np.hypot(apart[0] * weight, apart[1])
+        found.append(np.log(length / distance))
+        apart = apart / length * distance
+    return np.array(found)
 
 
 HISTORY = ("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode")

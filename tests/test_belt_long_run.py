@@ -7,8 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from belts import on_belt, with_all_parts
-from scipy.integrate import solve_ivp
+from belts import by_scipy, on_belt, states_at, with_all_parts
 
 import ringsweep
 from ringsweep.config import load
@@ -293,33 +292,12 @@ def test_period_of_thirteen_cycles_is_found_in_each_span():
     assert words(found) == ["periodic"] * 5
     np.testing.assert_allclose(found.period, 13.0 * period, rtol=1e-9)
 
-    def pull(t, x, v):
-        return 0.3 * np.sin(1.6 * t) - x - x**3 - 0.02 * (v + 1.0)
-
-    t, state, sign, stops, points = 0.0, [0.1, -1.0], -1, [], []
-    while t < 213 * period:
-
-        def rates(t, y, sign=sign):
-            x, v = y
-            return [v + 1.0, pull(t, x, v) - sign * (0.2 + 0.4 * np.exp(-3.0 * abs(v))) if sign else 0.0]
-
-        def ends(t, y, sign=sign):
-            return sign * y[1] if sign else 0.6 - abs(pull(t, y[0], 0.0))
-
-        ends.terminal, ends.direction = True, -1
-        part = solve_ivp(
-            rates, (t, 213 * period), state, "DOP853", events=ends, dense_output=True, rtol=1e-10, atol=1e-12
-        )
-        first, last = int(t / period) + 1, int(part.t[-1] / period)
-        points += [part.sol(n * period) for n in range(first, last + 1)]
-        t, state = part.t[-1], [part.y[0, -1], 0.0]
-        held = bool(sign and abs(pull(t, state[0], 0.0)) <= 0.6)
-        stops += [t] * held
-        sign = 0 if held else int(np.sign(pull(t, state[0], 0.0)))
-    x = np.array(points)[-27:, 0]
+    parts = by_scipy(cubic(1.6, 0.3) | {"time": {"span": 213 * period}}, 1e-10)
+    x = states_at(parts, period * np.arange(187, 213))[:, 0]
     np.testing.assert_allclose(x[13:], x[:-13], atol=1e-7)
     assert min(abs(x[-1] - x[-1 - k]) for k in range(1, 13)) > 1e-3
-    assert np.sum(np.array(stops) > 200 * period) == pytest.approx(13.0 * found.stops_per_cycle[0].item())
+    stops = sum(part.t[0] > 200 * period for part, sign in parts if sign == 0.0)
+    assert stops == pytest.approx(13.0 * found.stops_per_cycle[0].item())
 
 
 def test_words_of_free_motions():

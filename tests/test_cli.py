@@ -17,6 +17,7 @@ import xarray as xr
 import yaml
 from belts import on_belt, with_all_parts
 from jsonschema import Draft202012Validator
+from rings import TYPED
 
 import ringsweep
 from ringsweep.cli import main
@@ -35,26 +36,7 @@ from ringsweep.storage import netcdf
 
 ROOT = Path(__file__).parents[1]
 
-TEXT = """\
-scene:
-  model: ring
-  body: {mass: 0.076 kg, inertia: 4.47e-5 kg m^2, half_distance: 25 mm, ball_radius: 10 mm}
-  ring: {radius: 43.378 mm}
-  friction:
-    law: bengisu-akay
-    rough: {mu_s: 0.5, mu_k: 0.3}
-    rest: {mu_s: 0.2, mu_k: 0.1}
-    alpha: 1.0e5
-    v0: 2.0e-6
-  zone: {half_angle: 15 deg}
-  drive: {law: arctan, amplitude: 2.0}
-  time: {span: 10}
-solver: {method: rk4, steps: 1000}
-sweep:
-  grid:
-    drive.amplitude: {geomspace: [0.1, 10, 5]}
-"""
-
+TEXT = TYPED.replace("    zone.half_angle: [2 deg, 0.5]\n", "")
 
 SIGNED = {"Conventions": "CF-1.11", "ringsweep_version": "0"}
 

@@ -4,27 +4,18 @@ import numpy as np
 import pytest
 from belts import on_belt, with_all_parts, with_exponent
 from scipy.integrate import solve_ivp
+from solutions import growth
 
 import ringsweep
 
-BODY = {"model": "belt", "body": {"mass": 1.0}, "gravity": 1.0}
-
 #: A body on any spring, with a damper and a force, under a set-valued law.
-FORCED = BODY | {
-    "spring": {"stiffness": 1.0, "cubic": 0.0},
-    "damper": {"coefficient": 0.0},
-    "belt": {"velocity": 0.0},
-    "friction": {"law": "tustin", "mu_s": 0.3, "mu_k": 0.3, "alpha": 1.0},
-    "force": {"amplitude": 1.0, "frequency": 1.0, "phase": 0.0},
-    "initial": {"x": 1.0, "velocity": 0.0},
-}
+FORCED = on_belt(
+    {"law": "tustin", "mu_s": 0.3, "mu_k": 0.3, "alpha": 1.0},
+    damping=0.0, velocity=0.0, gravity=1.0, force=(1.0, 1.0, 0.0), start=(1.0, 0.0),
+)  # fmt: skip
 
 #: The friction oscillator of bSTAB without a force.
-FREE = BODY | {
-    "spring": {"stiffness": 1.0},
-    "damper": {"coefficient": 0.1},
-    "friction": {"law": "tustin", "mu_s": 1.0, "mu_k": 0.5, "alpha": 2.0},
-}
+FREE = on_belt({"law": "tustin", "mu_s": 1.0, "mu_k": 0.5, "alpha": 2.0}, damping=0.1, gravity=1.0)
 
 
 def run(scene, points=None, *options, **more):
@@ -85,7 +76,7 @@ def test_exponent_of_the_oscillator_of_ueda():
 @pytest.mark.slow
 def test_exponent_is_that_of_two_neighbouring_runs():
     """Pairs of runs, brought together again after each period, in random cells with and without stops."""
-    cells, periods, distance = 20, 120, 1e-7
+    cells, periods = 20, 120
     rng = np.random.default_rng(30)
     period = 2.0 * np.pi / rng.uniform(0.3, 2.5, cells)
     speed = rng.uniform(0.05, 0.6, cells) * (rng.random(cells) < 0.8)
@@ -101,17 +92,15 @@ def test_exponent_is_that_of_two_neighbouring_runs():
     }
     scene = FORCED | {"friction": {"law": "tustin", "mu_s": 0.4, "mu_k": 0.2, "alpha": 2.0}}
     found = run(scene, points | {"time.span": periods * period})
-    both = {path: np.tile(column, 2) for path, column in points.items()} | {"time.span": np.tile(period, 2)}
+
+    def ends(state):
+        both = {path: np.tile(column, 2) for path, column in points.items()} | {"time.span": np.tile(period, 2)}
+        both["initial.x"], both["initial.velocity"] = state
+        last = run(scene, both)
+        return np.array([last.x_end.values, last.velocity_end.values])
+
     state = np.array([points["initial.x"], points["initial.velocity"]])
-    apart, growth = np.full((2, cells), distance), np.zeros((periods, cells))
-    for k in range(periods):
-        both["initial.x"], both["initial.velocity"] = np.hstack([state, state + apart])
-        ends = run(scene, both)
-        ends = np.array([ends.x_end.values, ends.velocity_end.values])
-        state, apart = ends[:, :cells], ends[:, cells:] - ends[:, :cells]
-        length = np.hypot(apart[0] * 2.0 * np.pi / period, apart[1])
-        growth[k], apart = np.log(length / distance), apart / length * distance
-    used = growth[periods // 4 :]
+    used = growth(ends, state, 2.0 * np.pi / period, periods, 1e-7)[periods // 4 :]
     scatter = np.hypot(used.std(axis=0) / np.sqrt(len(used)), found.lyapunov_error.values * period)
     assert (np.abs(found.lyapunov.values * period - used.mean(axis=0)) <= 3.0 * scatter + 0.02).all()
     assert 0 < (found.stick_time.values == 0.0).sum() < cells
@@ -153,17 +142,9 @@ def test_multipliers_with_bristles_that_let_go():
     """The reset integrator jumps at breakaway and at each reversal. SciPy finds the derivative of its period map."""
     v_belt, force, frequency, damping, stiffness, damping_z, mu_s, mu_k = 0.2, 0.3, 0.8, 0.05, 5.0, 0.4, 0.35, 0.25
     period = 2.0 * np.pi / frequency
-    scene = BODY | {
-        "spring": {"stiffness": 1.0},
-        "damper": {"coefficient": damping},
-        "belt": {"velocity": v_belt},
-        "friction": {
-            "law": "reset-integrator", "mu_s": mu_s, "mu_k": mu_k, "sigma0": stiffness, "sigma1": damping_z,
-        },
-        "force": {"amplitude": force, "frequency": frequency / (2.0 * np.pi)},
-        "initial": {"x": 0.1},
-        "time": {"span": 150 * period},
-    }  # fmt: skip
+    law = {"law": "reset-integrator", "mu_s": mu_s, "mu_k": mu_k, "sigma0": stiffness, "sigma1": damping_z}
+    scene = on_belt(law, damping=damping, velocity=v_belt, gravity=1.0, span=150 * period)
+    scene |= {"force": {"amplitude": force, "frequency": frequency / (2.0 * np.pi)}, "initial": {"x": 0.1}}
     found = run(scene, certify=True)
 
     def after(state, sign, periods=1):
@@ -228,31 +209,23 @@ def test_friction_that_falls_steeply_has_the_exponent_of_neighbouring_runs():
         force=(1.49253, 0.446578, -2.48131),
         start=(0.1, 0.0),
     )
-    periods, left_out, distance = 60, 20, 1e-8
     found = run(scene | {"time": {"span": 100 / 0.446578}}, {"initial.x": [0.1]})
-    at, apart, growth = np.array([0.1, 0.0]), np.array([distance, 0.0]), []
-    for _ in range(periods):
-        x, v = np.transpose([at, at + apart])
-        ends = run(scene | {"time": {"span": 1 / 0.446578}}, {"initial.x": x, "initial.velocity": v}, False)
-        (at, other) = np.transpose([ends.x_end.values, ends.velocity_end.values])
-        length = np.hypot((other - at)[0] * 2.0 * np.pi * 0.446578, (other - at)[1])
-        growth.append(np.log(length / distance))
-        apart = (other - at) / length * distance
-    assert found.lyapunov.item() / 0.446578 == pytest.approx(np.mean(growth[left_out:]), abs=0.03)
+
+    def ends(state):
+        x, v = state
+        last = run(scene | {"time": {"span": 1 / 0.446578}}, {"initial.x": x, "initial.velocity": v}, False)
+        return np.array([last.x_end.values, last.velocity_end.values])
+
+    used = growth(ends, np.array([[0.1], [0.0]]), 2.0 * np.pi * 0.446578, 60, 1e-8)[20:]
+    assert found.lyapunov.item() / 0.446578 == pytest.approx(np.mean(used), abs=0.03)
 
 
 def test_the_record_changes_no_other_outcome():
     scene = FORCED | {"time": {"span": "30 s"}, "belt": {"velocity": 0.1}}
     plain, asked = (run(scene, {"force.frequency": [0.1, 0.2]}, exponent) for exponent in (False, True))
     added = set(asked.data_vars) - set(plain.data_vars)
-    assert added == {
-        "lyapunov",
-        "lyapunov_error",
-        "multiplier_1",
-        "multiplier_2",
-        "multiplier_angle_1",
-        "multiplier_angle_2",
-    }
+    angles = {f"multiplier{of}_{k}" for of in ("", "_angle") for k in (1, 2)}
+    assert added == {"lyapunov", "lyapunov_error", *angles}
     assert asked.drop_vars(added).equals(plain)
 
 

@@ -6,17 +6,16 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.interpolate import PchipInterpolator
+from belts import by_scipy, on_belt
 from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
+from solutions import cell_of
 from tiers import mostly_slow
 
 import ringsweep
-from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS, batch
+from ringsweep.models import batch
 from ringsweep.models.belt.series import Mode
 from ringsweep.models.interface import audit, implicit, series
 from ringsweep.numerics.terms import COLUMNS
@@ -32,30 +31,17 @@ SMALL_STEPS = {"method": "rk4", "steps": 20_000}
 EXACT = {"method": "event", "rtol": 1e-13, "certify": False}
 
 
-def forced(law="stiction", *, friction=0.0, load=0.0, v_b=0.0, span=10.0, force=None, **parts):
+def forced(law="stiction", *, friction=0.0, load=0.0, v_b=0.0, span=10.0, force=None, k=1.0, cubic=0.0, c=0.0, x=0.0,
+           v=None):  # fmt: skip
     """Scene with mass, stiffness and weight in units of 1; `friction` is F_s = F_k, `load` is added to F_s.
 
     A part that is not given has the coefficient 0, so that all scenes of a law have one kernel.
     """
     of_law = {"bengisu-akay": {"v0": 1e-6, "alpha": 10.0}, "karnopp": {"dead_band": 0.05}}.get(law, {})
-    return {
-        "model": "belt",
-        "body": {"mass": 1.0},
-        "spring": {"stiffness": parts.get("k", 1.0), "cubic": parts.get("cubic", 0.0)},
-        "damper": {"coefficient": parts.get("c", 0.0)},
-        "force": {"amplitude": 0.0, "frequency": 0.0, "phase": 0.0, "constant": 0.0} | (force or {}),
-        "belt": {"velocity": v_b},
-        "friction": {"law": law, "mu_s": friction + load, "mu_k": friction, **of_law},
-        "gravity": 1.0,
-        "initial": {"x": parts.get("x", 0.0), "velocity": parts.get("v", v_b)},
-        "time": {"span": span},
-    }
-
-
-def cell_of(scene):
-    """The only cell of a scene."""
-    found = load({"scene": scene}).scene
-    return take(batch(found.structure, {path: np.array([value]) for path, value in found.values.items()}), 0)
+    friction = {"law": law, "mu_s": friction + load, "mu_k": friction, **of_law}
+    start = x, v_b if v is None else v
+    scene = on_belt(friction, k, cubic=cubic, damping=c, velocity=v_b, gravity=1.0, start=start, span=span)
+    return scene | {"force": {"amplitude": 0.0, "frequency": 0.0, "phase": 0.0, "constant": 0.0} | (force or {})}
 
 
 def end(scene, solver="auto"):
@@ -216,39 +202,6 @@ class TestPublished:
         np.testing.assert_allclose(found, (x, velocity), atol=1e-4)
 
 
-def reference(scene, span):
-    """State at the end under stiction, by SciPy; events are located by SciPy too."""
-    k, cubic, c = scene["spring"]["stiffness"], scene["spring"]["cubic"], scene["damper"]["coefficient"]
-    given, v_b = scene["force"], scene["belt"]["velocity"]
-    static, kinetic = scene["friction"]["mu_s"], scene["friction"]["mu_k"]
-
-    def pull(t, x, v):
-        if "time" in given:
-            push = given["amplitude"] * PchipInterpolator(given["time"], given["force"])(t)
-        else:
-            push = given["amplitude"] * sin(2.0 * pi * given["frequency"] * t + given["phase"])
-        return push + given["constant"] - k * x - cubic * x**3 - c * (v + v_b)
-
-    def holds(t, y):
-        return static - abs(pull(t, y[0], 0.0))
-
-    t, y = 0.0, (scene["initial"]["x"], scene["initial"]["velocity"] - v_b)
-    while t < span:
-        sticks = y[1] == 0.0 and holds(t, y) > 1e-9
-        sign = 0.0 if sticks else np.sign(y[1] or pull(t, y[0], 0.0))
-
-        def rates(t, y, sign=sign):
-            return y[1] + v_b, (pull(t, *y) - sign * kinetic) if sign else 0.0
-
-        def event(t, y, sign=sign):
-            return sign * y[1] if sign else holds(t, y)
-
-        event.terminal, event.direction = True, -1
-        found = solve_ivp(rates, (t, span), y, "DOP853", rtol=1e-12, atol=1e-13, events=event, max_step=0.05)
-        t, y = found.t[-1], (found.y[0, -1], 0.0 if found.status == 1 else found.y[1, -1])
-    return y[0], y[1] + v_b
-
-
 def everything(rng, law="stiction", *, table=False):
     """Random scene with all parts together."""
     constant = rng.uniform(-0.5, 0.5)
@@ -278,7 +231,9 @@ class TestMethods:
         rng = np.random.default_rng(17)
         for _ in range(4):
             scene = everything(rng, table=table)
-            np.testing.assert_allclose(end(scene), reference(scene, 6.0), atol=1e-9)
+            (last, _) = by_scipy(scene, max_step=0.05)[-1]
+            exact = last.y[:, -1] + np.array([0.0, scene["belt"]["velocity"]])
+            np.testing.assert_allclose(end(scene), exact, atol=1e-9)
 
     @pytest.mark.slow
     def test_step_of_a_table_moves_the_body_as_its_ramps_do(self):
@@ -310,18 +265,6 @@ class TestMethods:
         scene["friction"] |= {"mu_s": 0.0, "mu_k": 0.0}
         solver = {"method": "rk4", "steps": 6000, "certify": False}
         np.testing.assert_allclose(end(scene, solver), end(scene, EXACT), atol=1e-9)
-
-    @pytest.mark.slow
-    def test_cells_with_different_forces_are_the_same_alone_and_side_by_side(self):
-        """`rk4` groups cells by the shape of the force."""
-        scene, solver = everything(np.random.default_rng(3)), {"method": "rk4", "steps": 500, "certify": False}
-        axes = {"force.frequency": [0.2, 0.5], "force.amplitude": [1.0, 2.0], "force.constant": [0.0, 0.4]}
-        together = ringsweep.sweep(scene, axes, solver=solver, progress=False)
-        for point in ({"force_frequency": i, "force_amplitude": i, "force_constant": 1 - i} for i in (0, 1)):
-            cell = together.isel(point)
-            own = {name: float(cell[f"force_{name}"]) for name in ("frequency", "amplitude", "constant")}
-            alone = outcome(scene | {"force": scene["force"] | own}, solver)
-            assert float(cell.x_end) == pytest.approx(float(alone.x_end), abs=1e-12)
 
     @pytest.mark.slow
     def test_smooth_law_tends_to_its_limit_with_all_parts(self):
@@ -458,10 +401,6 @@ class TestParts:
         cells = self.cells(self.plain(), (swept,))
         assert [name for name in belt.OPTIONAL if type(cells.body) in ring.having(belt.OnBelt, name)] == [part]
         assert isinstance(cells.drive, Forced) == (part == "force")
-
-    def test_name_of_a_number_in_a_dataset_tells_no_default(self):
-        known = MODELS["belt"].parameters(load({"scene": self.plain()}).scene.structure)
-        assert known["damper.coefficient"].attributes["long_name"] == "coefficient of the damper to the wall"
 
     def test_parts_without_effect_change_nothing(self):
         plain, zero = self.plain(), forced(friction=0.4, load=0.1)

@@ -18,15 +18,12 @@ from hypothesis import strategies as st
 from rings import course, rubs, shape
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from solutions import made, motion
+from solutions import cell_of, made, motion
 
 import ringsweep
-from ringsweep.compile import take
 from ringsweep.config import load, own
 from ringsweep.errors import InputError
-from ringsweep.models import batch
 from ringsweep.numerics.expressions import derivative, evaluate
-from ringsweep.numerics.intervals import Enclosure
 from ringsweep.physics.friction.formula import FormulaError, read_formula
 from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.physics.friction.velocity import (
@@ -54,13 +51,6 @@ def formula(mu, at_rest="mu_s", **parameters):
 
 def outcome(scene, method="auto"):
     return ringsweep.simulate(scene, solver=method)
-
-
-def cell_of(scene):
-    """Cells of a scene, of which there is one: each field is a number, or an array of it."""
-    config = load({"scene": scene})
-    cells = batch(config.scene.structure, {path: np.array([value]) for path, value in config.scene.values.items()})
-    return take(cells, 0)
 
 
 def refused(friction):
@@ -345,38 +335,6 @@ class TestRegions:
         law = made(define(Definition("mu_s/(1 + v/w)/(1 - v/w)**2/2", "mu_s")), w=1.0)
         assert law.thresholds[-3] == pytest.approx(1.0, rel=1e-14)
         assert law.thresholds[-3] < 1.0 < law.thresholds[-2]
-
-
-class TestIntervals:
-    """Bounds on a function over intervals of the speed, against values in between."""
-
-    @pytest.mark.slow
-    @settings(max_examples=200)
-    @given(trees, st.floats(0.0, 2.0), st.floats(1e-9, 1.0), st.lists(st.floats(0.0, 1.0), min_size=1, max_size=5))
-    def test_interval_of_a_function_and_of_its_slopes_contains_their_values(self, tree, low, width, shares):
-        value_of(tree, low)
-        found = read_formula(text_of(tree))
-        thresholds = thresholds_of(found)
-        high = low + width
-        # An interval lies on one side of each switch.
-        high = min([high, *(threshold for threshold in thresholds if threshold > low)])
-        values = {name: np.array([value]) for name, value in VALUES.items()}
-        enclosure = Enclosure(found.mu, values, [np.array([threshold]) for threshold in thresholds])
-        row, low, high = np.zeros(1, dtype=int), np.array([low]), np.array([high])
-        coefficient, factorial = found.mu, 1.0
-        for k, bounds in enumerate(enclosure(row, low, high, low, 3)):
-            least, most = (0.0, 0.0) if bounds is None else (bounds.low[0], bounds.high[0])
-            for share in shares:
-                v = min(low[0] + share * (high[0] - low[0]), np.nextafter(high[0], 0.0))
-                value = float(evaluate(coefficient, v, VALUES, thresholds)) / factorial
-                if math.isfinite(value) and not math.isnan(least):
-                    # The value itself is rounded.
-                    off = 1e-9 * (1.0 + abs(value))
-                    assert least - off <= value <= most + off, (text_of(tree), k, v)
-                # What is undefined somewhere is no part of an interval that is defined everywhere.
-                if k == 0 and math.isnan(value) and bounds is not None:
-                    assert math.isnan(least) or bounds.partial is not None or not math.isfinite(least + most)
-            coefficient, factorial = derivative(coefficient), factorial * (k + 1)
 
 
 # Features of friction around a speed c, of width w, with height 1.

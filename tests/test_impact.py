@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
-from rings import bump, course, rubs, shape
+from rings import bump, course, particle, rubs, shape
 from scipy.optimize import linprog
 from tiers import mostly_slow
 
@@ -24,15 +24,7 @@ from ringsweep.storage import netcdf
 
 G, RADIUS = 9.81, 0.2
 
-PARTICLE = {
-    "model": "ring-single-contact",
-    "body": {"mass": 0.1},
-    "ring": {"radius": RADIUS},
-    "friction": {"law": "stiction", "rest": {"mu_s": 0.3, "mu_k": 0.1}},
-    "initial": {"omega": "12 rad/s"},
-    "time": {"span": "1.2 s"},
-    "impact": {"restitution": 0},
-}
+PARTICLE = particle(0.1, RADIUS) | rubs("stiction", rest=(0.3, 0.1)) | course("none", omega=12.0, span=1.2, e=0)
 BODY = (
     shape(0.076, 4.2e-5, 0.0315, 0.008, 0.043378, zone="15 deg")
     | rubs("stiction", rest=(0.2, 0.1), rough=(0.5, 0.3))
@@ -238,43 +230,6 @@ class TestBody:
         assert run.gap_1[-1] == run.gap_2[-1] == 0.0
         assert run.impact_loss.item() > 0.3 * lost
         assert lost == pytest.approx(run.impact_loss.item() - work, rel=2e-3)
-
-    def test_lengths_times_and_masses_of_another_size_scale_all_numbers(self):
-        length, time, mass = 3.0, 0.7, 5.0
-        body = {"mass": mass, "inertia": mass * length**2, "half_distance": length, "ball_radius": length}
-        larger = AT_REST | {
-            "body": {name: value * body[name] for name, value in BODY["body"].items()},
-            "ring": {"radius": BODY["ring"]["radius"] * length},
-            "gravity": G * length / time**2,
-            "time": {"span": 2.0 * time},
-        }
-        one = ringsweep.sweep(AT_REST, {"initial.omega": LAUNCHES}, progress=False)
-        other = ringsweep.sweep(larger, {"initial.omega": LAUNCHES / time}, progress=False)
-        assert (one.certified.values == 1).all()
-        assert (one.impacts.values > 0).sum() >= 5
-        speed = length / time
-        units = {
-            "regime": 1, "aftermath": 1, "separations": 1, "impacts": 1, "tumbles": 1, "phi_end": 1,
-            "t_separation": time, "open_time": time, "flight_time": time, "t_recovered": time, "gap_max": length,
-            "impact_speed_max": speed, "impulse_max": mass * speed, "impact_loss": mass * speed**2,
-        }  # fmt: skip
-        for name, unit in units.items():
-            np.testing.assert_allclose(other[name].values / unit, one[name].values, rtol=1e-8, err_msg=name)
-
-    def test_order_in_which_zones_are_listed_changes_nothing(self):
-        zones = [
-            {"center": center, "half_angle": half, "mu_s": mu_s, "mu_k": 0.6 * mu_s}
-            for center, half, mu_s in ((0.0, 0.3, 0.5), (1.5, 0.2, 0.4), (-2.0, 0.4, 0.3))
-        ]
-        scene = {name: part for name, part in BODY.items() if name != "zone"}
-        scene["friction"] = {name: part for name, part in BODY["friction"].items() if name != "rough"}
-        one, other = (
-            ringsweep.sweep(scene | {"zones": listed}, {"drive.amplitude": AMPLITUDES}, progress=False)
-            for listed in (zones, [zones[2], zones[0], zones[1]])
-        )
-        assert (one.impacts > 0).all()
-        for name in one.data_vars:
-            np.testing.assert_array_equal(one[name], other[name], err_msg=name)
 
     def test_small_map_has_every_word_of_the_aftermath(self):
         spans = np.linspace(0.1, 2.0, 20)

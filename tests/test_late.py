@@ -1,15 +1,14 @@
 """Late and slow events: the millionth period is as exact as the first, and a pull may grow as slowly as it likes."""
 
-from fractions import Fraction
-from math import atanh, cos, pi, ulp
+from math import atanh
 
 import numpy as np
 import pytest
 import xarray as xr
 from belts import with_all_parts
+from rings import course, particle, rubs
 
 import ringsweep
-from ringsweep.numerics.clock import Instant, later, phase, shifted_phase
 from ringsweep.quantities.flags import REGIMES
 
 STICTION = {"law": "stiction", "mu_s": 0.07, "mu_k": 0.05}
@@ -35,38 +34,6 @@ def runs(of, axes, **solver):
     """Runs whose axes vary together."""
     together = {path: xr.DataArray(np.asarray(values), dims="run") for path, values in axes.items()}
     return ringsweep.sweep(of, together, progress=False, solver={"method": "auto"} | solver)
-
-
-class TestClock:
-    def test_sum_of_many_steps_loses_nothing(self):
-        rng = np.random.default_rng(1)
-        steps = 10.0 ** rng.uniform(-15.0, 2.0, 2000)
-        now, exact = Instant(1e6, 0.0), Fraction(10**6)
-        for step in steps.tolist():
-            now, exact = later(now, step), exact + Fraction(step)
-            assert abs(now.rest) <= 0.5 * ulp(now.t)
-        assert abs(Fraction(now.t) + Fraction(now.rest) - exact) < Fraction(1, 2**80)
-
-    def test_phase_is_as_exact_in_the_millionth_turn_as_in_the_first(self):
-        rng = np.random.default_rng(2)
-        for _ in range(500):
-            frequency, start = 10.0 ** rng.uniform(-3.0, 6.0), rng.uniform(-3.0, 3.0)
-            t = 1e6 * rng.uniform() / frequency
-            rest = rng.uniform(-0.5, 0.5) * ulp(t)
-            turns = Fraction(frequency) * (Fraction(t) + Fraction(rest))
-            within = float(turns - round(turns))
-            assert cos(phase(frequency, t, rest, start)) == pytest.approx(cos(2.0 * pi * within + start), abs=2e-15)
-
-    def test_phase_since_a_late_instant_does_not_depend_on_the_instant(self):
-        """Nor does it jump from one rounding to the next if the phase at t = 0 has many turns."""
-        rng = np.random.default_rng(3)
-        turns_of_start = phase(97.0, 0.0, 0.0, 2.0 * pi * 2.0**33)
-        for since in 10.0 ** rng.uniform(-12.0, 1.0, 200):
-            exact = cos(2.0 * pi * 97.0 * since)
-            late = later(Instant(2.0**30, 0.0), since)
-            assert cos(shifted_phase(97.0, late.t, late.rest, -(2.0**30), 0.0)) == pytest.approx(exact, abs=2e-12)
-            turns = phase(97.0, since, 0.0, 2.0 * pi * 2.0**33) - phase(97.0, since, 0.0, 0.0)
-            assert turns == pytest.approx(turns_of_start, abs=1e-14)
 
 
 class TestForcedBelts:
@@ -155,14 +122,7 @@ class TestSlowPulls:
 
 @pytest.mark.slow
 def test_angle_on_a_rocking_ring_repeats_to_rounding_after_10000_periods():
-    of = {
-        "model": "ring-single-contact",
-        "body": {"mass": 1.0},
-        "ring": {"radius": 1.0},
-        "friction": {"law": "stiction", "rest": {"mu_s": 0.4, "mu_k": 0.3}},
-        "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": 0.25},
-        "time": {"span": 1.0},
-    }
+    of = particle(1.0, 1.0) | rubs("stiction", rest=(0.4, 0.3)) | course("sinusoidal", 1.0, 0.25, span=1.0)
     found = runs(of, {"time.span": 4.0 * np.array([300.0, 301.0, 30000.0])})
     assert (found.certified == 1).all()
     assert (found.stick_time > 100.0).all()
@@ -198,8 +158,7 @@ class TestLateImplicitSteps:
     def test_ring_drive(self, friction):
         rest = {name: value for name, value in friction.items() if name.startswith("mu_")}
         friction = {name: value for name, value in friction.items() if name not in rest} | {"rest": rest}
-        of = {"model": "ring-single-contact", "body": {"mass": 1.0}, "ring": {"radius": 1.0}, "gravity": 10.0}
         drive = {"law": "formula", "theta": PULSE, "F": 0.1, "f": 100.0, "t0": 1.0, "w": 0.05}
-        of |= {"friction": friction, "drive": drive, "time": {"span": 1.0}}
+        of = particle(1.0, 1.0) | {"gravity": 10.0, "friction": friction, "drive": drive, "time": {"span": 1.0}}
         found = runs(of, {"drive.t0": self.LATE, "time.span": self.LATE + 1.0})
         self.assert_alike(found, ("omega_max", "phi_max", "phi_end", "omega_end"))

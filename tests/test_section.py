@@ -4,7 +4,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from belts import with_all_parts
+from belts import by_scipy, on_belt, states_at, with_all_parts
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -12,26 +12,14 @@ from ringsweep import cli
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint
 
-BODY = {"model": "belt", "gravity": 1.0, "body": {"mass": 1.0}, "spring": {"stiffness": 1.0}}
-
 #: It sticks, slips, and passes the speed of the belt, under a force with the period 4.
-FORCED = BODY | {
-    "damper": {"coefficient": 0.02},
-    "belt": {"velocity": 0.3},
-    "friction": {"law": "tustin", "mu_s": 0.6, "mu_k": 0.2, "alpha": 3.0},
-    "force": {"amplitude": 0.5, "frequency": 0.25},
-    "initial": {"x": 0.1, "velocity": 0.0},
-    "time": {"span": 48.0},
-}
+FORCED = on_belt(
+    {"law": "tustin", "mu_s": 0.6, "mu_k": 0.2, "alpha": 3.0},
+    damping=0.02, velocity=0.3, gravity=1.0, force=(0.5, 0.25), start=(0.1, 0.0), span=48.0,
+)  # fmt: skip
 
-BRISTLES = BODY | {
-    "belt": {"velocity": 0.1},
-    "friction": {
-        "law": "lugre", "mu_s": 0.15, "mu_k": 0.1, "sigma0": 100.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.05,
-    },
-    "force": {"amplitude": 0.05, "frequency": 0.2},
-    "time": {"span": 20.0},
-}  # fmt: skip
+LUGRE = {"law": "lugre", "mu_s": 0.15, "mu_k": 0.1, "sigma0": 100.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.05}
+BRISTLES = on_belt(LUGRE, velocity=0.1, gravity=1.0, force=(0.05, 0.2), span=20.0)
 
 
 def run(scene, section, output=None, **sweep):
@@ -40,56 +28,21 @@ def run(scene, section, output=None, **sweep):
     return ringsweep.run(deepcopy(config), output, jobs=1, progress=False)
 
 
-def reference(times):
-    """Displacement and velocity at some times in the scene FORCED, and at its maxima, by SciPy."""
-    c, v_belt, mu_s, mu_k, alpha = 0.02, 0.3, 0.6, 0.2, 3.0
-
-    def pull(t, x, v):
-        return 0.5 * np.sin(0.5 * np.pi * t) - x - c * (v + v_belt)
-
-    t, state, sign, found, maxima = 0.0, [0.1, -0.3], -1, [], []
-    while t < 48.0:
-
-        def rates(t, y, sign=sign):
-            x, v = y
-            friction = sign * (mu_k + (mu_s - mu_k) * np.exp(-alpha * abs(v)))
-            return [v + v_belt, pull(t, x, v) - friction if sign else 0.0]
-
-        def ends(t, y, sign=sign):
-            return sign * y[1] if sign else mu_s - abs(pull(t, y[0], 0.0))
-
-        def turns(t, y):
-            return y[1] + v_belt
-
-        ends.terminal, ends.direction, turns.direction = True, -1, -1
-        part = solve_ivp(
-            rates, (t, 48.0), state, "DOP853", events=(ends, turns), dense_output=True, rtol=1e-12, atol=1e-13
-        )
-        found += [part.sol(at) for at in times if t < at <= part.t[-1]]
-        maxima += [y[0] for y in part.y_events[1]]
-        t, state = part.t[-1], [part.y[0, -1], 0.0]
-        # The pull decides at rest, and its sign is that of the slip that follows.
-        held = abs(pull(t, state[0], 0.0)) <= mu_s if sign else False
-        sign = 0 if held else int(np.sign(pull(t, state[0], 0.0)))
-    states = np.array(found)
-    return states[:, 0], states[:, 1] + v_belt, np.array(maxima)
-
-
 @pytest.mark.slow
 def test_points_at_each_force_period_equal_an_independent_integration():
-    x, velocity, _ = reference(4.0 * np.arange(1, 13))
+    x, sliding = states_at(by_scipy(FORCED), 4.0 * np.arange(1, 13)).T
     ds = run(FORCED, {"at": "period", "keep": 12})
     assert ds.stick_time > 2.0
     assert ds.slips > 3
     np.testing.assert_allclose(ds.x_section, x, atol=1e-9)
-    np.testing.assert_allclose(ds.velocity_section, velocity, atol=1e-9)
+    np.testing.assert_allclose(ds.velocity_section, sliding + 0.3, atol=1e-9)
     assert ds.x_section.dims == ("section",)
     assert "deflection_section" not in ds
 
 
 @pytest.mark.slow
 def test_points_at_each_turn_are_the_maxima_of_an_independent_integration():
-    *_, maxima = reference([48.0])
+    maxima = np.array([y[0] for part, _ in by_scipy(FORCED) for y in part.y_events[1]])
     ds = run(FORCED, {"at": "turn"})
     np.testing.assert_allclose(ds.x_section[: len(maxima)], maxima, atol=1e-9)
     assert np.isnan(ds.x_section[len(maxima) :]).all()
