@@ -1,7 +1,6 @@
 """Rodas5P: the tableau meets the order conditions, and errors fall with these orders."""
 
-from itertools import combinations_with_replacement
-from math import cos, exp, prod, sin
+from math import cos, exp, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from ringsweep.models.interface import implicit
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.creep import Start
-from ringsweep.solvers.rosenbrock import DENSE, GAMMA, STAGES, TIME_DERIVATIVE_WEIGHTS, TIMES, A, C
+from ringsweep.solvers.rosenbrock import GAMMA, STAGES, A, C
 
 #: Coefficients of the standard form k_i = h f(y + sum alpha_ij k_j) + h J sum gamma_ij k_j.
 GAMMAS = np.linalg.inv(np.eye(STAGES) / GAMMA - C)
@@ -20,77 +19,7 @@ BETAS = ALPHAS + GAMMAS
 WEIGHTS = np.array([*A[-1, :-1], 1.0])
 
 
-def trees(order):
-    """Rooted trees with `order` vertices, each a tuple of its branches."""
-    if order == 1:
-        return [()]
-    found = set()
-    for sizes in partitions(order - 1):
-        choices = [[]]
-        for size in set(sizes):
-            bundles = list(combinations_with_replacement(trees(size), sizes.count(size)))
-            choices = [[*one, *bundle] for one in choices for bundle in bundles]
-        found |= {tuple(sorted(choice)) for choice in choices}
-    return sorted(found)
-
-
-def partitions(n, most=None):
-    """Ways to write n as a sum of positive integers, largest first."""
-    if n == 0:
-        return [()]
-    return [(k, *rest) for k in range(min(n, most or n), 0, -1) for rest in partitions(n - k, k)]
-
-
-def size(tree):
-    return 1 + sum(map(size, tree))
-
-
-def density(tree):
-    return size(tree) * prod(map(density, tree))
-
-
-def elementary_weights(tree):
-    """Elementary weight of a tree at each stage: beta for a single branch, alpha for each of several branches."""
-    if not tree:
-        return np.ones(STAGES)
-    matrix = BETAS if len(tree) == 1 else ALPHAS
-    return np.prod([matrix @ elementary_weights(branch) for branch in tree], axis=0)
-
-
-def dense_weights(fraction):
-    polynomial = DENSE[0] + fraction * (DENSE[1] + fraction * DENSE[2])
-    return fraction * WEIGHTS + fraction * (1 - fraction) * polynomial
-
-
 class TestTableau:
-    def test_number_of_rooted_trees_is_right_for_each_order(self):
-        assert [len(trees(n)) for n in range(1, 6)] == [1, 1, 2, 4, 9]
-
-    def test_times_and_weights_of_the_time_derivative_are_row_sums(self):
-        np.testing.assert_allclose(ALPHAS.sum(axis=1), TIMES, rtol=0, atol=1e-13)
-        np.testing.assert_allclose(GAMMAS.sum(axis=1), TIME_DERIVATIVE_WEIGHTS, rtol=0, atol=1e-12)
-
-    def test_matrices_of_the_tableau_are_strictly_lower_triangular(self):
-        for matrix in (A, C):
-            np.testing.assert_array_equal(matrix, np.tril(matrix, -1))
-        np.testing.assert_allclose(np.diag(GAMMAS), GAMMA, rtol=1e-14)
-
-    @pytest.mark.parametrize("tree", [tree for n in range(1, 6) for tree in trees(n)], ids=str)
-    def test_solution_meets_every_condition_up_to_order_5(self, tree):
-        assert WEIGHTS @ GAMMAS @ elementary_weights(tree) == pytest.approx(1 / density(tree), abs=2e-13)
-
-    @pytest.mark.parametrize("tree", [tree for n in range(1, 5) for tree in trees(n)], ids=str)
-    def test_embedded_solution_meets_every_condition_up_to_order_4(self, tree):
-        """The last stage estimates the error; the solution without it is the embedded one."""
-        embedded = np.array([*A[-1, :-1], 0.0])
-        assert embedded @ GAMMAS @ elementary_weights(tree) == pytest.approx(1 / density(tree), abs=2e-13)
-
-    @pytest.mark.parametrize("tree", [tree for n in range(1, 5) for tree in trees(n)], ids=str)
-    def test_dense_output_meets_every_condition_up_to_order_4(self, tree):
-        for fraction in (0.0, 0.25, 0.5, 0.9, 1.0):
-            found = dense_weights(fraction) @ GAMMAS @ elementary_weights(tree)
-            assert found == pytest.approx(fraction ** size(tree) / density(tree), abs=1e-12)
-
     def test_method_is_l_stable(self):
         """|R| <= 1 on the imaginary axis, and thus in the left half plane, and R vanishes at infinity."""
 
