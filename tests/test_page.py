@@ -125,14 +125,6 @@ def test_page_loads_nothing_from_elsewhere_and_fits_a_telephone(bokeh, tmp_path)
     assert int(re.search(r"max-width: (\d+)vw", tooltip)[1]) < 50
 
 
-def test_colours_stand_beside_the_plot_and_on_a_narrow_screen_below_it(bokeh, tmp_path):
-    page = page_of(sweep(4, 3), tmp_path)
-    (plot,) = models(page, "Figure")
-    beside, below = (json.dumps(plot[side]).count('"ColorBar"') for side in ("right", "below"))
-    assert beside == below == len(script(page)["variables"])
-    assert "window.innerWidth < 600" in html.unescape(page)
-
-
 def test_page_holds_numbers_with_four_digits_and_no_bound_is_rounded_down(bokeh, tmp_path):
     ds = sweep(5, 4)
     ds["t_separation"][2, 1] = np.nan
@@ -255,13 +247,3 @@ def test_map_writes_a_page_and_refuses_boundaries_in_it(bokeh, tmp_path, monkeyp
     assert models((tmp_path / "my.html").read_text(encoding="utf-8"), "Select")[0]["value"] == "phi_max"
     assert cli.main(["map", "my.nc", "-o", "my.html", "--boundaries", "separating"]) == 2
     assert "not for a page" in capsys.readouterr().err
-
-
-def test_zeros_have_a_colour_of_their_own_and_the_least_number_has_not(bokeh, tmp_path):
-    ds = sweep(12, 10)
-    errors = np.geomspace(1e-12, 1e-6, 120).reshape(12, 10)
-    errors[:3] = 0.0
-    ds = ds[["regime", "t_end_error"]].assign(t_end_error=(ds["t_end_error"].dims, errors, ds["t_end_error"].attrs))
-    (mapper,) = models(page_of(ds, tmp_path), "LogColorMapper")
-    assert mapper["low_color"] not in mapper["palette"]
-    assert 0.9 * errors[errors > 0.0].min() < mapper["low"] < errors[errors > 0.0].min()
