@@ -98,18 +98,6 @@ class TestFile:
         assert "at 95 % confidence" in ds.attrs["audit"]
 
     @pytest.mark.slow
-    def test_file_equals_the_sweep_in_memory(self, config, ds):
-        undated = {"date_created": "", "history": ""}
-        in_memory = ringsweep.run(config, progress=False)
-        xr.testing.assert_identical(ds.drop_attrs(deep=False), in_memory.drop_attrs(deep=False))
-        assert in_memory.assign_attrs(undated).attrs == ds.assign_attrs(undated).attrs
-
-    @pytest.mark.slow
-    def test_file_is_enough_to_repeat_its_sweep(self, refined, tmp_path):
-        ringsweep.run(refined, tmp_path / "again.nc", progress=False).close()
-        assert same_bits(refined, tmp_path / "again.nc")
-
-    @pytest.mark.slow
     def test_further_axis_makes_a_stack_of_refined_maps(self, scene):
         axes = {"zone.half_angle": AXES["zone.half_angle"], "friction.law": ["tustin", "stiction"]}
         axes["drive.amplitude"] = AXES["drive.amplitude"]
