@@ -1,7 +1,5 @@
 """Phase portrait, friction loop and film of a body on a belt show places, velocities and forces of the run."""
 
-import re
-
 import numpy as np
 import pytest
 from belts import on_belt
@@ -11,11 +9,7 @@ from matplotlib.quiver import Quiver
 
 import ringsweep
 from ringsweep import plots
-from ringsweep.cli import main
 from ringsweep.errors import InputError
-from ringsweep.models import parameters
-from ringsweep.models.scene import Structure
-from ringsweep.physics.drives import DRIVES
 from ringsweep.plots import films
 from ringsweep.plots.look import PAIR_COLOURS
 from ringsweep.plots.phase import _MODE_STYLES
@@ -157,12 +151,6 @@ class TestFrictionLoop:
         assert area > 0.5
         assert ax.get_xlabel() == "distance slid on the belt (m)"
 
-    def test_spike_of_bristles_does_not_flatten_the_loop(self, lugre, ax):
-        plots.friction_loop(lugre, ax=ax)
-        assert lugre.friction_force.min() < -30.0
-        assert ax.get_ylim()[0] > -3.0
-        assert "axis clipped; values from \N{MINUS SIGN}31.6" in ax.get_title(loc="right")
-
     def test_unknown_axis_and_a_ring_are_refused(self, run, ax):
         with pytest.raises(InputError, match="neither 'velocity' nor 'distance'"):
             plots.friction_loop(run, "place", ax)
@@ -210,43 +198,3 @@ class TestFilm:
         assert above.get_title().startswith(f"t = {time:.4f} s, ")
         sign = "+" if velocity >= 0 else "\N{MINUS SIGN}"
         assert film.body.speeds.get_text() == f"body {sign}{abs(velocity):.3f} m s⁻¹, belt +0.100 m s⁻¹"
-
-    def test_belt_carries_its_marks_along_with_a_body_that_sticks(self, film, run):
-        film.show_frame(60)
-        first, x = film.body.marks.get_xdata()[:-1:3], film.body.body.get_x()
-        film.show_frame(61)
-        then, now = film.body.marks.get_xdata()[:-1:3], film.body.body.get_x()
-        step = (then[:5, None] - first[None]).ravel()
-        assert np.abs(step - (now - x)).min() < 1e-12
-
-    def test_body_without_a_spring_is_drawn_without_one(self):
-        free = ringsweep.simulate(belt({"law": "stiction"}, span=1.0, spring={"stiffness": 0.0}))
-        film = films._Film(free, 5.0, 1.0)
-        assert not film.body.spring.get_visible()
-        assert not any("spring" in text.get_text() for text in film.body.ax.texts)
-
-    @pytest.mark.parametrize("drive", DRIVES)
-    def test_axes_of_a_belt_map_speak_of_no_ring_and_no_angle(self, drive):
-        names = [parameter.long_name for parameter in parameters(Structure("belt", "stiction", drive)).values()]
-        assert not [name for name in names if re.search(r"\bring\b|\bangle\b|\bangular\b", name)]
-
-    def test_picture_of_a_belt_speaks_of_no_ring(self, film):
-        texts = [text.get_text() for legend in film.subfigs[0].legends for text in legend.get_texts()]
-        for axes in film.axes:
-            texts += [axes.get_title(), axes.get_xlabel(), axes.get_ylabel(), *(text.get_text() for text in axes.texts)]
-        assert "$F$" in texts
-        assert "friction on the body" not in texts
-        assert not [text for text in texts if "ring" in text.replace("spring", "")]
-
-    def test_animate_writes_a_film_of_a_belt(self, tmp_path, monkeypatch, run):
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: run)
-        save = plots.save_animation
-        monkeypatch.setattr(
-            "ringsweep.plots.save_animation",
-            lambda ds, path, **given: save(ds, path, fps=5, duration=0.6, **given),
-            raising=False,
-        )
-        assert main(["init", "--model", "belt", "belt.yaml"]) == 0
-        assert main(["animate", "belt.yaml", "-o", "run.html"]) == 0
-        assert "data:image/png" in (tmp_path / "run.html").read_text()
