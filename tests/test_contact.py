@@ -164,14 +164,6 @@ class TestAtRest:
             other = self.mode(body, (s2, s1), (k2, k1), -phi, -omega, -epsilon)
             assert other == MIRRORED.get(one, one)
 
-    def test_stick_has_positive_reactions_and_a_saturation_of_at_most_one(self, problems):
-        for body, static, kinetic, phi, omega, epsilon in problems:
-            if self.mode(body, static, kinetic, phi, omega, epsilon) == STICK:
-                kappa, reserve, n1, n2 = contact.stick(body, *static, (sin(phi), cos(phi), omega), epsilon)
-                assert min(n1, n2) >= 0.0
-                assert reserve >= 0.0
-                assert abs(kappa) <= 1.0
-
 
 def response(body, K, phi, omega):
     """Accelerations of both gaps without contact forces, and their changes by a unit of each reaction with friction."""
