@@ -160,14 +160,3 @@ class TestInWords:
         assert line == "jammed begins at zone.half_angle = 0.2617994 ± 1.0e-06 rad; below: oscillatory"
         plain = found.assign_coords(zone_half_angle=found.zone_half_angle.assign_attrs(units="1"))
         assert "= 0.2617994 ± 1.0e-06; below" in in_words(plain)
-
-    def test_quantile_of_an_angle_is_told_in_the_unit_asked_for(self):
-        ends = {"": np.radians([30.0]), "_low": np.radians([15.0]), "_high": [np.inf]}
-        found = xr.Dataset(
-            {f"threshold_quantile{end}": ("quantile", values) for end, values in ends.items()}
-            | {"threshold": (("replicate", "sample"), np.zeros((1, 4)), {"units": "rad"})},
-            coords={"quantile": [0.5]},
-            attrs={"threshold_path": "zone.half_angle", "boundary_of": "jammed", "scan": "3 runs"},
-        )
-        assert "  50% below 0.523599 rad (0.261799 to inf)" in in_words(found).splitlines()
-        assert "  50% below 30 deg (15 to inf)" in in_words(found.assign_attrs(threshold_unit="deg")).splitlines()
