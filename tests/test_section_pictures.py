@@ -1,7 +1,5 @@
 """Pictures of sections: diagrams in both directions, the points of one motion, multipliers and exponents."""
 
-from itertools import pairwise
-
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -67,18 +65,6 @@ def test_exponent_and_multipliers_stand_below_on_the_same_axis(diagram):
     assert len(plots.bifurcation(bare).axes) == 1
 
 
-@pytest.mark.parametrize("width", [85.0, 170.0])
-def test_no_text_covers_another(diagram, width):
-    plots.style("print", width=width)
-    try:
-        figure = plots.bifurcation(diagram)
-        figure.canvas.draw()
-        labels = [ax.yaxis.label.get_window_extent() for ax in figure.axes]
-        assert not any(a.overlaps(b) for a, b in pairwise(labels))
-    finally:
-        plots.style()
-
-
 def test_a_section_shows_its_points_in_time(diagram):
     one = diagram.isel(force_frequency=0, direction=1)
     (drawn,) = points(plots.section_panel(one, Figure().subplots()))
@@ -137,18 +123,3 @@ def test_all_ways_to_a_picture_choose_the_diagram(diagram):
         plots.regime_map(several, var="x_section")
     with pytest.raises(InputError, match=r"points of sections: plots\.bifurcation draws them"):
         plots.map_panel(diagram, var="x_section", ax=Figure().subplots())
-
-
-@pytest.mark.slow
-def test_the_command_chooses_the_diagram_by_itself(diagram, tmp_path, capsys):
-    file = tmp_path / "diagram.nc"
-    diagram.to_netcdf(file)
-    assert cli.main(["map", str(file)]) == 0
-    assert (tmp_path / "diagram-x_section.png").exists()
-    assert cli.main(["map", str(file), "--var", "regime"]) == 0
-    assert (tmp_path / "diagram.png").exists()
-    several = xr.concat([diagram, diagram], xr.DataArray([1.0, 2.0], dims="belt_velocity", name="belt_velocity"))
-    several.to_netcdf(tmp_path / "two.nc")
-    assert cli.main(["map", str(tmp_path / "two.nc"), "--var", "x_section"]) == 2
-    assert "hold the others" in capsys.readouterr().err
-    assert cli.main(["map", str(tmp_path / "two.nc"), "--sel", "belt_velocity=1"]) == 0
