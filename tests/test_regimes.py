@@ -97,13 +97,6 @@ class TestRecord:
         assert (found.omega_min, found.omega_max) == (min(omega), max(omega))
         assert (found.phi_end, found.omega_end) == (phi[-1], omega[-1])
 
-    @given(states)
-    def test_mirrored_run_has_the_same_motion(self, states):
-        phi, omega = np.transpose(states)
-        run, mirrored = outcome(phi, omega), outcome(-phi, -omega)
-        for name in ("regime", "motion", "reversals", "turns"):
-            assert getattr(run, name) == getattr(mirrored, name)
-
     def test_stick_time_is_the_sum_over_intervals(self):
         assert outcome(np.zeros(5), np.zeros(5), stuck_for=0.25).stick_time == 1.0
 
