@@ -2,12 +2,10 @@
 
 from math import floor, nextafter, pi
 
-import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from ringsweep.compile import take
 from ringsweep.physics.zones import Arc, Uniform, coefficients, locate, roughest, surface_of
 
 REST = (0.2, 0.1)
@@ -104,19 +102,3 @@ class TestEdges:
     @pytest.mark.parametrize("x", [-1e-300, -1e-17, -0.0])
     def test_tiny_negative_angle_does_not_round_to_a_full_turn(self, x):
         assert found_at(surface_with([(1.0, 1.0)]), x)[2] in (0, 1)
-
-
-def test_surface_of_a_batch_equals_the_surfaces_of_its_cells():
-    rng = np.random.default_rng(1)
-    center, half_angle = rng.uniform(-6, 6, (2, 20)), rng.uniform(0, pi, (2, 20))
-    batch = surface_of(
-        [Arc(c, h, np.full(20, 0.9), np.full(20, 0.8)) for c, h in zip(center, half_angle, strict=True)], *REST
-    )
-    for i in range(20):
-        alone = surface_of([Arc(center[k, i], half_angle[k, i], 0.9, 0.8) for k in range(2)], *REST)
-        for found, expected in zip(take(batch, i), alone, strict=True):
-            np.testing.assert_array_equal(found, expected)
-
-
-def test_roughest_is_the_largest_static_and_the_least_kinetic_coefficient():
-    assert roughest(surface_of([Arc(0.0, 0.3, 0.5, 0.4), Arc(2.0, 0.3, 0.3, 0.05)], *REST)) == (0.5, 0.05)
