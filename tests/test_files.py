@@ -141,15 +141,6 @@ class TestKilledWriter:
         assert (tmp_path / "run.nc").read_bytes() == b"first"
         assert os.listdir(tmp_path) == ["run.nc"]
 
-    def test_folder_that_could_not_be_removed_is_removed_before_the_next_run(self, tmp_path, monkeypatch):
-        with monkeypatch.context() as patch:
-            patch.setattr(os, "rmdir", lambda path: os.listdir(f"{path}/not there"))
-            with replacing(tmp_path / "out.png") as temporary:
-                temporary.touch()
-        assert sorted(os.listdir(tmp_path)) == ["out.png", "out.png.partial"]
-        files.check_writable(tmp_path / "out.png")
-        assert os.listdir(tmp_path) == ["out.png"]
-
     def test_history_beside_unfinished_cells_keeps_them(self, tmp_path):
         folder = put_cells(tmp_path / "out.nc")
         before = sorted(os.listdir(folder))
@@ -168,12 +159,6 @@ def refusing(number):
 
 
 class TestLocks:
-    def test_lock_that_fails_leaves_no_folder(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(files, "_lock", refusing(errno.EIO))
-        with pytest.raises(InputError, match="Input/output error"), replacing(tmp_path / "run.nc"):
-            pass
-        assert os.listdir(tmp_path) == []
-
     @pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
     def test_file_system_without_locks_is_told_and_used(self, tmp_path, monkeypatch, caplog, number):
         monkeypatch.setattr(files, "_lock", refusing(number))
@@ -240,17 +225,6 @@ def test_folder_that_is_deleted_while_a_sweep_runs_is_named_as_the_cause(config,
     assert "out.nc.partial was deleted while this process used it" in message
     assert "is the disk full" not in message
     assert cli.main(["run", str(config), "-o", str(target)]) == 0
-
-
-def test_history_whose_folder_is_deleted_meanwhile_names_the_cause(tmp_path):
-    def write():
-        with replacing(tmp_path / "run.nc") as file:
-            (file.parent / "lock").unlink()
-            file.parent.rmdir()
-            file.write_bytes(b"lost")
-
-    with pytest.raises(OSError, match="was deleted while this process used it"):
-        write()
 
 
 def test_names_are_on_the_disk_before_what_relies_on_them(config, monkeypatch):
