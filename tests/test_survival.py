@@ -8,7 +8,6 @@ import shutil
 import signal
 import threading
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from itertools import takewhile
 
@@ -214,18 +213,6 @@ class TestContinuation:
         assert len(tasks_of(target)) >= 6 - int(jobs)
         assert cli.main(command) == 0
         assert same_bits(target, never_stopped)
-
-    def test_interrupt_in_the_first_tasks_says_that_it_waits_for_compilation(
-        self, config, tmp_path, monkeypatch, caplog, small_tasks
-    ):
-        def interrupted(*arguments):
-            os.kill(os.getpid(), signal.SIGINT)
-            return replace(compute_task(*arguments), seconds=None)
-
-        monkeypatch.setattr("ringsweep.runs.grid.compute_task", interrupted)
-        monkeypatch.setattr("ringsweep.runs.task_sizes._known", {})
-        assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc"), "--jobs", "1"]) == 130
-        assert "stopping when compilation and the first cells are done" in caplog.text
 
     @pytest.mark.parametrize("call", ["sweep", "simulate", "precision"])
     def test_interrupt_ends_at_once_what_keeps_nothing(self, scene, monkeypatch, call):
@@ -457,17 +444,6 @@ class TestOnlyTask:
         ringsweep.run({"scene": scene}, target, progress=False).close()
         assert left(target) == ["out.nc"]
 
-    def test_only_task_that_cannot_be_kept_does_not_count_as_finished(self, scene, tmp_path, monkeypatch):
-        target = tmp_path / "out.nc"
-        monkeypatch.setattr(Checkpoint, "_write", full)
-        with stopping(monkeypatch, netcdf, "write", 0), pytest.raises(Stopped) as stopped:
-            ringsweep.run({"scene": scene}, target, progress=False)
-        assert not hasattr(stopped.value, "__notes__")
-
-
-def full(*arguments):
-    raise OSError(errno.ENOSPC, "No space left on device")
-
 
 class TestResultFile:
     def test_file_equals_the_sweep_in_memory(self, config, never_stopped):
@@ -488,23 +464,6 @@ class TestResultFile:
         assert solver["rtol"] == 1e-10
         assert cli.main(["run", str(again)]) == 0
         assert "holds this sweep already" in capsys.readouterr().out
-
-    def test_file_is_compressed_in_chunks_of_the_layout(self, scene, tmp_path, monkeypatch):
-        monkeypatch.setattr("ringsweep.storage.chunks.CHUNK", 6)
-        monkeypatch.setattr(netcdf, "COMPRESSED_FROM", 1)
-        axes = {
-            "drive.amplitude": xr.DataArray([0.5, 1.0, 2.0, 8.0], dims="rig"),
-            "body.mass": xr.DataArray([0.05, 0.06, 0.07, 0.08], dims="rig"),
-            "zone.half_angle": ["5 deg", "15 deg", "40 deg"],
-            "friction.law": ["tustin", "stiction"],
-        }
-        scene = scene | {"friction": scene["friction"] | {"alpha": 10.0}}
-        found = ringsweep.sweep(scene, axes, tmp_path / "out.nc", progress=False)
-        assert found["t_end"].encoding["chunksizes"] == (1, 2, 2)
-        assert {"drive_amplitude", "body_mass"} <= set(found.coords)
-        in_memory = ringsweep.sweep(scene, axes, progress=False)
-        xr.testing.assert_equal(found.load(), in_memory)
-        found.close()
 
     def test_file_with_shared_dimensions_is_repeated_with_them(self, scene, tmp_path, caplog):
         """A configuration cannot name shared dimensions; the coordinates of the file do."""
