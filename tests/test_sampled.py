@@ -412,23 +412,6 @@ def test_a_sample_takes_no_cells_of_another(tmp_path: Any) -> None:
         run(config(n=256), tmp_path / "many.nc", reuse=tmp_path / "few.nc")
 
 
-def test_a_sample_that_is_not_allowed_is_told_with_its_probability() -> None:
-    with pytest.raises(InputError, match=r"must be greater than 0 kg: normal\(1, 0.5\) has probability 0\.023 of that"):
-        load(config(of={"body.mass": {"normal": [1.0, 0.5]}}))
-    # Nobody draws what has a probability of 1e-23.
-    assert load(config(of={"body.mass": {"normal": [1.0, 0.1]}})).sample is not None
-    with pytest.raises(InputError, match="not all points of the sample are allowed") as caught:
-        load(config(of={"friction.mu_k": {"normal": [0.15, 0.01]}}))
-    assert caught.value.path == "scene.friction.mu_k"
-
-
-def test_a_path_varies_in_one_place_only() -> None:
-    with pytest.raises(InputError, match="one place only"):
-        load(config(grid={"friction.mu_s": [0.1, 0.2]}))
-    with pytest.raises(InputError, match="swept here"):
-        load(config(), ["friction.mu_s=0.2"])
-
-
 def test_a_sampled_sweep_cannot_be_refined() -> None:
     with pytest.raises(InputError, match=r"sweep\.refine: cannot stand beside"):
         ringsweep.run(config(grid={"belt.velocity": [0.1, 0.2]}), refine=True)
