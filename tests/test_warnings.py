@@ -53,19 +53,14 @@ def warned(caplog):
     return lambda text: sum(text in record.getMessage() for record in caplog.records)
 
 
+@pytest.mark.parametrize(
+    ("given", "stiff", "at_once"),
+    [({}, 1, 0), ({"scene": AT_THE_TOP, "solver": "auto"}, 0, 1), ({"solver": "auto"}, 0, 0)],
+)
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-class TestPython:
-    def test_steps_beyond_the_limit_of_stability_give_one_warning(self, call, tmp_path, warned):
-        call(tmp_path)
-        assert (warned(STIFF), warned(LAUNCH)) == (1, 0)
-
-    def test_runs_that_end_at_t_0_give_one_warning(self, call, tmp_path, warned):
-        call(tmp_path, scene=AT_THE_TOP, solver="auto")
-        assert (warned(STIFF), warned(LAUNCH)) == (0, 1)
-
-    def test_good_runs_give_no_warning(self, call, tmp_path, warned):
-        call(tmp_path, solver="auto")
-        assert (warned(STIFF), warned(LAUNCH)) == (0, 0)
+def test_each_call_gives_one_warning_and_none_about_good_runs(call, tmp_path, warned, given, stiff, at_once):
+    call(tmp_path, **given)
+    assert (warned(STIFF), warned(LAUNCH)) == (stiff, at_once)
 
 
 def test_finished_file_gives_the_warning_again_without_computation(tmp_path, warned):
