@@ -138,14 +138,6 @@ def test_alpha_zero_is_static_friction_at_all_speeds(cells, law):
     assert found.t_separation == pytest.approx(twin.t_separation[0], abs=1e-8)
 
 
-@pytest.mark.parametrize("law", ["bengisu-akay", "tustin", "stiction"])
-def test_body_at_rest_on_top_of_the_ring_separates_at_once(cells, law):
-    found = solve(Auto(), cells({"initial.phi": pi}, law=law, drive="arctan"))
-    assert found.regime == SEPARATING
-    assert found.t_separation == 0.0
-    assert found.certified
-
-
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4])
 def test_loose_tolerance_causes_no_false_separation(cells, rtol):
     """An inaccurate power series of a reaction has roots that the reaction does not have."""
@@ -212,8 +204,3 @@ class TestEnergy:
         for rtol in (1e-7, 1e-10):
             drift, steps = self.drift(cells, method(rtol, certify=False), law, 1000.0)
             assert drift < steps * rtol
-
-    def test_energy_loss_of_rk4_is_of_fifth_order_in_the_step(self, cells):
-        steps = np.array([1000, 2000, 4000])
-        losses = [self.drift(cells, RK4(int(n), certify=False), "bengisu-akay", 10.0)[0] for n in steps]
-        assert -np.polyfit(np.log(steps), np.log(losses), 1)[0] == pytest.approx(5.0, abs=0.3)
