@@ -47,6 +47,48 @@ def solve(method, batch):
     return SimpleNamespace(**vars(result), **dict(zip(Outcome._fields, result.rows.T, strict=True)))
 
 
+def balances(body, phi):
+    """Acceleration of the body without contact forces, and its change by a unit of each contact force.
+
+    Components: radially outwards and along the race at the centre of mass, and angular. The second array has one column
+    for each of the forces N1, F1, N2, F2.
+    """
+    b = body
+    free = np.array([b.gravity * cos(phi), -b.gravity * sin(phi), 0.0])
+    units = []
+    for side in (-1, 1):
+        # Normal, tangent and lever arm of the contact in radial and tangential components at the centre of mass.
+        out, along = np.array([b.cos_beta, side * b.sin_beta]), np.array([-side * b.sin_beta, b.cos_beta])
+        arm = b.radius * out - np.array([b.xi, 0.0])
+        for force in (-out, along):
+            units.append([*force / b.mass, (arm[0] * force[1] - arm[1] * force[0]) / b.inertia])
+    return free, np.array(units).T
+
+
+def contact_accelerations(body, motion, omega):
+    """Acceleration of the gap and of the place along the race, at both contacts."""
+    b = body
+    radial, tangential, angular = motion
+    centre = b.xi / b.cos_beta
+    found = []
+    for side in (-1, 1):
+        half = side * centre * b.sin_beta
+        # The ball's centre sits `half` along the tangent from the centre of mass.
+        ball = np.array([radial - half * angular, tangential - half * omega**2])
+        out, along = np.array([b.cos_beta, side * b.sin_beta]), np.array([-side * b.sin_beta, b.cos_beta])
+        gap = -(ball @ out + centre * omega**2)
+        found.append((gap, ball @ along + (b.radius - centre) * angular))
+    return found
+
+
+def gap_response(body, K, phi, omega):
+    """Accelerations of both gaps without contact forces, and their changes by a unit of each reaction with friction."""
+    free, units = balances(body, phi)
+    base = np.array(contact_accelerations(body, free, omega))[:, 0]
+    columns = [units[:, 2 * i] + K[i] * units[:, 2 * i + 1] for i in (0, 1)]
+    return base, np.array([np.array(contact_accelerations(body, free + c, omega))[:, 0] - base for c in columns]).T
+
+
 def growth(ends, state, weight, periods, distance):
     """Logarithms of the growth of a disturbance in each period, of shape ``(periods, cells)``.
 

@@ -4,7 +4,7 @@ from math import cos, sin
 
 import numpy as np
 import pytest
-from solutions import ball, rod
+from solutions import balances, ball, contact_accelerations, gap_response, rod
 
 from ringsweep.physics import contact
 from ringsweep.physics.contact import BACKWARD, CLOSED, FORWARD, IMPOSSIBLE, OPEN_1, OPEN_2, OPEN_BOTH, STICK
@@ -28,40 +28,6 @@ def draw(rng):
     kinetic = rng.uniform(0.0, rng.choice([0.8, 2.5]), 2)
     static = kinetic + rng.choice([0.0, 1.0]) * rng.uniform(0.0, 0.8, 2)
     return body, tuple(static), tuple(kinetic), rng.uniform(-np.pi, np.pi), rng.uniform(-10, 10), rng.normal(0, 60)
-
-
-def balances(body, phi):
-    """Acceleration of the body without contact forces, and its change by a unit of each contact force.
-
-    Components: radially outwards and along the race at the centre of mass, and angular. The second array has one column
-    for each of the forces N1, F1, N2, F2.
-    """
-    b = body
-    free = np.array([b.gravity * cos(phi), -b.gravity * sin(phi), 0.0])
-    units = []
-    for side in (-1, 1):
-        # Normal, tangent and lever arm of the contact in radial and tangential components at the centre of mass.
-        out, along = np.array([b.cos_beta, side * b.sin_beta]), np.array([-side * b.sin_beta, b.cos_beta])
-        arm = b.radius * out - np.array([b.xi, 0.0])
-        for force in (-out, along):
-            units.append([*force / b.mass, (arm[0] * force[1] - arm[1] * force[0]) / b.inertia])
-    return free, np.array(units).T
-
-
-def contact_accelerations(body, motion, omega):
-    """Acceleration of the gap and of the place along the race, at both contacts."""
-    b = body
-    radial, tangential, angular = motion
-    centre = b.xi / b.cos_beta
-    found = []
-    for side in (-1, 1):
-        half = side * centre * b.sin_beta
-        # The ball's centre sits `half` along the tangent from the centre of mass.
-        ball = np.array([radial - half * angular, tangential - half * omega**2])
-        out, along = np.array([b.cos_beta, side * b.sin_beta]), np.array([-side * b.sin_beta, b.cos_beta])
-        gap = -(ball @ out + centre * omega**2)
-        found.append((gap, ball @ along + (b.radius - centre) * angular))
-    return found
 
 
 def admissible(body, static, kinetic, phi, omega, epsilon):
@@ -165,14 +131,6 @@ class TestAtRest:
             assert other == MIRRORED.get(one, one)
 
 
-def response(body, K, phi, omega):
-    """Accelerations of both gaps without contact forces, and their changes by a unit of each reaction with friction."""
-    free, units = balances(body, phi)
-    base = np.array(contact_accelerations(body, free, omega))[:, 0]
-    columns = [units[:, 2 * i] + K[i] * units[:, 2 * i + 1] for i in (0, 1)]
-    return base, np.array([np.array(contact_accelerations(body, free + c, omega))[:, 0] - base for c in columns]).T
-
-
 @pytest.fixture(scope="module")
 def states():
     """Random bodies that slide: body, friction per unit of both reactions, angle, angular velocity."""
@@ -188,7 +146,7 @@ class TestSliding:
     def test_mode_is_the_admissible_one(self, states):
         seen, below = set(), 0
         for body, K, phi, omega in states:
-            base, A = response(body, K, phi, omega)
+            base, A = gap_response(body, K, phi, omega)
             scale = body.gravity + body.radius * omega**2
             normals = np.linalg.solve(A, -base) / body.mass
             lone = -base / np.diag(A) / body.mass
