@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-import ringsweep
 from ringsweep import cli
 from ringsweep.config import load
-from ringsweep.errors import InputError
 from ringsweep.quantities.flags import FAILED
 from ringsweep.runs import needs
 from ringsweep.runs.cells import TaskResult
@@ -110,12 +108,6 @@ def test_sweep_that_does_not_fit_is_refused_before_its_first_cell(sweep, tmp_pat
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 
-def test_sweep_in_memory_that_does_not_fit_is_refused(scene, monkeypatch):
-    monkeypatch.setattr(needs, "memory_of_machine", lambda: 300e6)
-    with pytest.raises(InputError, match="of memory, and this machine has"):
-        ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, progress=False)
-
-
 def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, tmp_path, monkeypatch):
     config = load(sweep(8))
     room = 64 * plan_of(config).bytes_of_cell()
@@ -183,12 +175,6 @@ def test_numbers_at_the_edge_of_a_double_give_a_file_without_a_picture(scene, tm
     assert cli.main(["run", "a.yaml"]) == 0
     assert "a.png is not drawn: values of initial_phi are too large to be drawn" in caplog.text
     assert (tmp_path / "a.nc").exists()
-
-
-def test_dry_run_measures_no_workers_of_dask(sweep, capsys):
-    arguments = ["--dry-run", "--backend", "dask", "--scheduler", "tcp://127.0.0.1:1"]
-    assert cli.main(["run", sweep(8), *arguments]) == 2
-    assert "--dry-run" in capsys.readouterr().err
 
 
 #: Most bytes that `run --refine --jobs 1` took, with the picture, by side of the map (stiction, 10 s).
