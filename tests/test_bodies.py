@@ -249,12 +249,6 @@ class TestLastBalance:
         with pytest.raises(ValueError, match=message):
             ring.completed(AboutCentre(*self.RIG, ()))
 
-    def test_friction_of_a_contact_that_only_the_other_loads_is_checked_too(self):
-        balances = "N1 = onto_1*K2*N2", "N2 = mass*press", "mass*radius*phi_dd = 2*K1*N1 + K2*N2 - mass*pull*sin_phi"
-        ring.body(balances=balances, energy=ENERGY)(Brake)
-        with pytest.raises(ValueError, match=r"K1\*N1 or K2\*N2 does not do the work of friction"):
-            ring.completed(Brake(1.0, 1.0, 9.81, 10.0, 5.0, 0.5, 0.0))
-
     def test_contact_without_friction_is_refused(self):
         balances = "N1 = mass*press", "N2 = mass*press", "mass*radius*phi_dd = K2*N2 - mass*pull*sin_phi"
         with pytest.raises(TypeError, match=r"K1\*N1 is in no balance"):
