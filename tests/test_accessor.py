@@ -155,9 +155,6 @@ class TestAHistoryAtOtherTimes:
         assert np.isnan(at.velocity).all()
         assert at.mode.values.tolist() == [1, 1]
 
-    def test_one_time_has_no_dimension(self, run):
-        assert run.ringsweep.at(0.25).x.item() == 1.25
-
     def test_runs_under_several_laws_end_each_at_its_own_time(self, run):
         longer = run.assign_coords(time=run.time * 2.0)
         law = xr.concat([run.ringsweep.at([0.0, 2.0, 4.0]), longer.ringsweep.at([0.0, 2.0, 4.0])], "friction_law")
@@ -177,10 +174,6 @@ class TestAHistoryAtOtherTimes:
 def test_dataset_in_place_of_a_scene_is_refused_with_what_to_call(ds):
     with pytest.raises(ringsweep.InputError, match=r"got a dataset: ds\.ringsweep\.simulate"):
         ringsweep.simulate(ds)
-
-
-def test_map_has_the_title_of_the_function(ds):
-    assert ds.ringsweep.map("t_end").axes[-1].get_ylabel() == plots.regime_map(ds, var="t_end").axes[-1].get_ylabel()
 
 
 @pytest.mark.parametrize("imports", ["ringsweep, xarray as xr", "xarray as xr, ringsweep"])
@@ -221,11 +214,6 @@ class TestCell:
             "drive.amplitude: 1.9 rad s⁻¹ is not in the dataset: the nearest value is taken, 2 rad s⁻¹",
             "zone_half_angle: 39° is not in the dataset: the nearest value is taken, 40°",
         ]
-
-    def test_cell_accepts_a_dataset_already_selected_with_xarray(self, maps):
-        found = plots.cell(maps.isel(drive_amplitude=2).sel(zone_half_angle=0.3, method="nearest"))
-        values = load(found).scene.values
-        assert (values["drive.amplitude"], values["zone.half_angle"]) == (8.0, float(maps["zone_half_angle"][1]))
 
     def test_cell_of_points_is_selected_by_number(self, scene):
         ds = mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0], "initial.omega": [3.0, 1.0, 2.0]}, points=True)
