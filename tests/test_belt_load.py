@@ -4,7 +4,7 @@ from math import acos, atan2, copysign, pi, sqrt
 
 import numpy as np
 import pytest
-from belts import outcome
+from belts import on_belt, outcome
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -18,16 +18,9 @@ SMALL_STEPS = {"method": "rk4", "steps": 40_000}
 
 def scene(law="stiction", *, growth=8.0, v_b=0.1, start=None, span=20.0, **friction):
     """Scene on a belt; `start` is displacement and velocity, by default at rest on the belt."""
-    x, velocity = start or (0.0, v_b)
-    return {
-        "model": "belt",
-        "body": {"mass": M, "normal_stiffness": growth},
-        "spring": {"stiffness": K},
-        "belt": {"velocity": v_b},
-        "friction": {"law": law, "mu_s": 0.4, "mu_k": 0.25, **friction},
-        "initial": {"x": x, "velocity": velocity},
-        "time": {"span": span},
-    }
+    friction = {"law": law, "mu_s": 0.4, "mu_k": 0.25, **friction}
+    found = on_belt(friction, K, velocity=v_b, start=start or (0.0, v_b), span=span)
+    return found | {"body": {"mass": M, "normal_stiffness": growth}}
 
 
 def word(found):
