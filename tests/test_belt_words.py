@@ -59,16 +59,6 @@ class TestSticking:
         np.testing.assert_array_equal(found.settled, [1, 0, 0])
 
 
-class TestRiding:
-    def test_body_that_has_not_broken_loose_is_riding(self):
-        """It breaks loose at k v_b t = mu_s F_N."""
-        needed = 0.15 * 9.81 / (2.0 * 0.1)
-        found = runs(scene("stiction", mu_s=0.15, mu_k=0.1, belt=0.1), [0.999 * needed, 1.001 * needed])
-        assert words(found) == ["riding", "stick-slip"]
-        np.testing.assert_array_equal(found.settled, 0)
-        assert found.first_slip.isnull().values.tolist() == [True, False]
-
-
 @pytest.mark.slow
 class TestRounding:
     """Rounded laws have the word of the law that they round."""
