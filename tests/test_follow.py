@@ -106,16 +106,6 @@ class TestBranches:
         # Below and above the fold there is one motion.
         assert abs(up / down - 1.0)[0] < 1e-3
 
-    def test_each_cell_is_a_run_from_the_end_of_the_one_before(self, both):
-        before = both.isel(force_frequency=3).sel(force_amplitude=0.5, direction="up")
-        scene = changed(HARDENING, "initial", x=float(before.x_end), velocity=float(before.velocity_end))
-        scene["force"]["frequency"] = FREQUENCIES[4]
-        now = both.isel(force_frequency=4).sel(force_amplitude=0.5, direction="up")
-        scene["time"]["span"] = float(now.t_end)
-        alone = run(scene)
-        for name in "x_end", "velocity_end", "swing":
-            assert alone[name] == now[name]
-
     def test_spans_are_whole_periods_so_that_sections_can_be_compared(self, both):
         periods = both.t_end * both.force_frequency
         assert np.allclose(periods, np.round(periods), rtol=0, atol=1e-9)
@@ -243,12 +233,6 @@ class TestErrors:
         beside = changed(LUGRE, "initial", x=1.0, **{"from": "a.nc"})
         self.refused(beside, "scene.initial.x", "leave one out")
         self.refused(changed(LUGRE, "initial", **{"from": str(tmp_path / "no.nc")}), "scene.initial.from", "no.nc")
-        configuration = tmp_path / "lugre.yaml"
-        configuration.write_text(json.dumps({"scene": LUGRE}))
-        self.refused(changed(LUGRE, "initial", **{"from": str(configuration)}), "scene.initial.from", "no result file")
-        run(LUGRE, tmp_path / "two.nc", sweep={"grid": {"initial.x": [0.0, 0.1]}}).close()
-        several = changed(LUGRE, "initial", **{"from": str(tmp_path / "two.nc")})
-        self.refused(several, "scene.initial.from", "2 runs")
 
 
 class TestFilesThatDoNotGoOn:
