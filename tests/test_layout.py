@@ -4,7 +4,6 @@ import math
 from threading import Event
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -60,32 +59,6 @@ def test_map_of_a_sweep_over_five_axes_reads_few_chunks():
 
 
 class TestTaskSizes:
-    def test_task_takes_a_hundredth_of_the_time_spent_within_bounds(self):
-        sizes = TaskSizes(1, lambda: 2)
-        assert sizes.next(10**9) == 1
-        # However fast the first one was, the second is at most eight times as large.
-        sizes.learn(FinishedTask(1, 1e-6))
-        assert sizes.next(10**9) == 8
-        sizes.learn(FinishedTask(100, 0.1))
-        assert sizes.next(10**9) == 100
-        sizes.learn(FinishedTask(99_000, 99.0))
-        assert sizes.next(10**9) == pytest.approx(1000, rel=0.02)
-        sizes.learn(FinishedTask(10**6, 1e3))
-        assert sizes.next(10**9) == pytest.approx(2000, rel=0.02)
-
-    def test_sweep_of_a_known_kind_needs_no_small_first_task(self):
-        TaskSizes(1, lambda: 1, "a kind of sweep").learn(FinishedTask(64, 0.004))
-        assert TaskSizes(1, lambda: 1, "a kind of sweep").next(64) >= 64
-        assert TaskSizes(1, lambda: 1, "another kind").next(64) == 1
-
-    def test_task_size_is_a_multiple_of_the_runs_side_by_side(self):
-        sizes = TaskSizes(16, lambda: 2)
-        assert sizes.next(10**9) == 16
-        sizes.learn(FinishedTask(16, 100.0))
-        assert sizes.next(10**9) == 16
-        sizes.learn(FinishedTask(1600, 1.6))
-        assert sizes.next(10**9) % 16 == 0
-
     @given(done=st.lists(st.booleans(), min_size=1, max_size=200), cost=st.floats(1e-5, 10.0))
     def test_tasks_contain_every_open_cell_once(self, done, cost):
         done = np.array(done)
