@@ -114,9 +114,7 @@ class TestReactionVanishesInStick:
 
 @pytest.mark.slow
 class TestLaunchOnIce:
-    ICE = SWINGING | {
-        "friction": {"law": "stiction", "rough": {"mu_s": 0.0, "mu_k": 0.0}, "rest": {"mu_s": 0.0, "mu_k": 0.0}}
-    }
+    ICE = SWINGING | rubs("stiction", rest=(0.0, 0.0), rough=(0.0, 0.0))
 
     def test_body_stays_on_both_contacts_or_loses_one_at_launch(self):
         """Without friction the ring does not matter: reactions at launch are those of a pendulum."""

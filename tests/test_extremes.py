@@ -148,10 +148,7 @@ class TestReactions:
 
     @pytest.mark.slow
     def test_contact_that_holds_in_a_pivot_has_its_least_reaction_there(self):
-        scene = RING | {
-            "friction": {"law": "stiction", "rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}},
-            "impact": {"restitution": 0.4},
-        }
+        scene = RING | rubs("stiction", rest=(0.2, 0.1), rough=(0.5, 0.3)) | {"impact": {"restitution": 0.4}}
         least = []
         for omega in np.linspace(20.0, 40.0, 9):
             run = ringsweep.simulate(scene | {"initial": {"phi": 0.5, "omega": omega}}, samples=4000)
@@ -165,15 +162,9 @@ class TestReactions:
 @pytest.mark.slow
 def test_greatest_velocity_within_a_long_step_is_as_exact_as_its_end():
     """The body creeps with the ring, in steps of a quarter of a period, and is fastest within one of them."""
-    scene = {
-        "model": "ring",
-        "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
-        "ring": {"radius": 0.043378},
-        "friction": {"law": "tanh", "v0": 4.495e-5, "rough": {"mu_k": 0.4833}, "rest": {"mu_k": 0.1869}},
-        "zone": {"half_angle": 1.4457},
-        "drive": {"law": "sinusoidal", "amplitude": 0.3412, "frequency": 0.2382},
-        "initial": {"phi": 0.1688, "omega": 0.0},
-    }
+    scene = shape(0.076, 4.47e-5, 0.025, 0.01, 0.043378, zone=1.4457)
+    scene |= course("sinusoidal", 0.3412, 0.2382, phi=0.1688, omega=0.0)
+    scene["friction"] = {"law": "tanh", "v0": 4.495e-5, "rough": {"mu_k": 0.4833}, "rest": {"mu_k": 0.1869}}
     found, exact = (
         ringsweep.sweep(scene, {"time.span": [8.0]}, solver={"method": "implicit", "rtol": rtol}, progress=False)
         for rtol in (3e-6, 1e-10)
