@@ -31,14 +31,15 @@ _FALL_FACTOR = 5.0
 
 
 @audit.least_scales.implements(Belt, BristleBelt)
-def _least_scales(batch):
+def _least_scales_on_belt(batch):
     """The scale of a time at least, s: that of a spring's swing."""
     with np.errstate(divide="ignore", over="ignore"):
         return {"s": np.minimum(np.sqrt(batch.body.mass / np.abs(batch.body.stiffness)), batch.span)}
 
 
 @audit.violation.implements(Belt)
-def _violation(scene, mode, forcing, y, rates, s, tolerance):
+def _violation_on_belt(scene, mode, forcing, y, rates, s, tolerance):
+    """Implement :func:`audit.violation` for laws of the velocity."""
     x, v = y
     body, push = scene.body, force_in(scene.drive, forcing)
     velocity = forcing[1] if mode.sign == 0 else moving(scene, v + forcing[1], v, forcing[1])
@@ -71,20 +72,23 @@ def _terms(body, motion, forcing):
 
 
 @audit.energy.implements(Belt, BristleBelt)
-def _energy(scene, forcing, y):
+def _energy_on_belt(scene, forcing, y):
+    """Implement :func:`audit.energy`: of the body and of the spring."""
     # The momentum in a dead band moves with the belt.
     hidden = y[1] - moving(scene, y[1], y[1], 0.0)
     return ring.energy(scene.body, (y[0], 0.0, y[1] + forcing[1])) - 0.5 * scene.body.mass * hidden * hidden
 
 
 @audited.implements(BristleBelt)
-def _audited(scene, mode, forcing, y):
+def _audited_on_bristle_belt(scene, mode, forcing, y):
+    """Implement :func:`audited`: slip, size of the terms of the acceleration, and no violation so far."""
     now = slip(scene, mode, (), forcing, implicit.to_implicit(scene, forcing, y))
     return now, _terms(scene.body, now.motion, forcing), 0.0
 
 
 @audit.undecided.implements(Belt, BristleBelt)
-def _undecided(batch, one, other, fall_rates):
+def _undecided_on_belt(batch, one, other, fall_rates):
+    """Implement :func:`audit.undecided`: sliding or oscillatory, and separated or not."""
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         return _sliding_or_swing(batch, one, other) | _may_hold(batch.body, one, other, fall_rates)
 
@@ -118,7 +122,8 @@ def _may_hold(body, one, other, fall_rates):
 
 
 @audit.same_statistics.implements(Belt, BristleBelt)
-def _same_statistics(batch, one, other):
+def _same_statistics_on_belt(batch, one, other):
+    """Implement :func:`audit.same_statistics`: range of the displacement, share of stick, stops in a cycle."""
     with np.errstate(invalid="ignore", over="ignore"):
         range_1, range_2 = one.x_max - one.x_min, other.x_max - other.x_min
         same = np.abs(range_1 - range_2) <= _SAME_SHARE * np.minimum(range_1, range_2)

@@ -57,13 +57,15 @@ def _deflection_at_start(scene):
 
 
 @constant_step.initial_state.implements(BristleBelt)
-def _initial_state_in_space(scene):
+def _initial_state_on_bristle_belt(scene):
+    """Implement :func:`constant_step.initial_state`: ``(x, velocity, z)``; m, m/s in space, m."""
     velocity = scene.initial_v + drives.turn(scene.drive, 0.0)[1]
     return scene.initial_x, velocity, _deflection_at_start(scene)
 
 
 @slip_in_space.implements(BristleBelt)
-def _slip_in_space(scene, y, v, forcing, angle):
+def _slip_on_bristle_belt(scene, y, v, forcing, angle):
+    """Implement :func:`slip_in_space`; what it adds to the slip is 1 if the body counts as stuck, else 0."""
     sign = select(v >= 0.0, 1.0, -1.0)
     stuck = _in_band(scene, v, y[2], sign)
     motion = y[0], force_in(scene.drive, forcing), y[1]
@@ -72,18 +74,21 @@ def _slip_in_space(scene, y, v, forcing, angle):
 
 
 @recorder.begin.implements(BristleBelt)
-def _begin(scene, t, seen):
+def _begin_record_on_bristle_belt(scene, t, seen):
+    """Implement :func:`recorder.begin`, for the speed and the distance at which bristles yield."""
     return begin(scene, t, seen, stick_speed(scene.law, recoil_speed(scene)), _play(scene))
 
 
 @recorder.keep_memory.implements(BristleBelt)
 def _keep_deflection(scene, row, column, y):
+    """Implement :func:`recorder.keep_memory`: the deflection of the bristles, m."""
     if column < len(row):
         row[column] = y[2]
 
 
 @modes.begin.implements(BristleBelt)
-def _begin_modes(scene):
+def _begin_on_bristle_belt(scene):
+    """Implement :func:`modes.begin`; the state is ``(x, v, z)``."""
     t, z = drives.beginning(scene.drive), _deflection_at_start(scene)
     v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
     y = scene.initial_x, v, z
@@ -106,7 +111,8 @@ def _begin_modes(scene):
 
 
 @modes.switch.implements(BristleBelt)
-def _switch(scene, mode, guard, t, y):
+def _switch_on_bristle_belt(scene, mode, guard, t, y):
+    """Implement :func:`modes.switch`; `guard` is an index into what ``creep.all_guards`` returns."""
     x, v, z = y
     # The order is that of `all_guards`.
     after_normal = ring.if_load_varies(scene.body, guard - 1, guard)
@@ -119,20 +125,23 @@ def _switch(scene, mode, guard, t, y):
 
 
 @slip.implements(BristleBelt)
-def _slip(scene, mode, common, forcing, x):
+def _slip_of_bristle_belt(scene, mode, common, forcing, x):
+    """Implement :func:`slip`; `x` is the displacement relative to the belt, the sliding velocity, the deflection."""
     motion = x[0] + forcing[0], force_in(scene.drive, forcing), x[1] + forcing[1]
     return _sliding(scene, motion, x[1:], float(mode.sign), mode.region)
 
 
 @region_guards.implements(BristleBelt)
-def _region_guards(scene, mode, common, x):
+def _region_guards_on_bristle_belt(scene, mode, common, x):
+    """Implement :func:`region_guards`: the sliding speed, m/s, and the guard of the bristles."""
     _, v, z = x
     sign = float(mode.sign)
     return sign * v, region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, mode.region)
 
 
 @implicit.error_scales.implements(BristleBelt)
-def _error_scales(scene, tolerance, x):
+def _error_scales_on_bristle_belt(scene, tolerance, x):
+    """Implement :func:`implicit.error_scales`, from the largest deflection that friction can hold."""
     deflection = scene.mu_s / scene.law.sigma0
     return (
         tolerance * (length_scale(scene, abs(x[1])) + deflection),

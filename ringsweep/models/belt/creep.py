@@ -15,12 +15,14 @@ from ringsweep.physics.friction.velocity import friction_in, stiction_band
 
 
 @implicit.is_stiff.implements(belt.Belt)
-def _is_stiff(scene, mode, y, linear):
+def _is_stiff_on_belt(scene, mode, y, linear):
+    """Implement :func:`implicit.is_stiff`: friction relaxes faster than the spring swings."""
     return relaxes(scene, linear, (scene.body.stiffness / scene.body.mass) ** 0.5)
 
 
 @implicit.error_scales.implements(belt.Belt)
-def _error_scales(scene, tolerance, x):
+def _error_scales_on_belt(scene, tolerance, x):
+    """Implement :func:`implicit.error_scales`: length of the motion; width of the stiction band."""
     # A load that varies may come from the displacement alone, whose size the launch tells.
     launch_x, launch_v = ring.if_load_varies(scene.body, (abs(scene.initial_x), abs(scene.initial_v)), (0.0, 0.0))
     length = launch_x + length_scale(scene, abs(drives.turn(scene.drive, scene.span)[1]) + launch_v)
@@ -28,7 +30,8 @@ def _error_scales(scene, tolerance, x):
 
 
 @slip.implements(belt.Belt)
-def _slip(scene, mode, common, forcing, x):
+def _slip_of_belt(scene, mode, common, forcing, x):
+    """Implement :func:`slip`; `x` is the displacement relative to the belt, m, and the sliding velocity, m/s."""
     v, sign = x[1], 1.0 if x[1] >= 0.0 else -1.0
     mu, slope = friction_in(scene.law, mode.region, abs(v), (scene.mu_s, scene.mu_k))
     # In a dead band friction balances all other forces.
@@ -46,7 +49,12 @@ def all_guards(body, normal, slow, fast):
 
 
 @implicit.guards_and_motion.implements(belt.Belt, belt.BristleBelt)
-def _guards_and_motion(scene, mode, common, forcing, x):
+def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
+    """Implement :func:`implicit.guards_and_motion`.
+
+    The motion is displacement, velocity and acceleration in space, friction (N), displacement relative to the belt,
+    sliding velocity, acceleration of the belt, and deflection of the bristles (NaN without bristles).
+    """
     now, body = slip(scene, mode, common, forcing, x), scene.body
     acceleration, _ = ring.acceleration(body, *now.K, now.motion)
     normal, _ = ring.reactions(body, *now.K, now.motion)
@@ -63,25 +71,29 @@ def deflection(length, x, missing):
 
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
-def _seen(scene, view):
+def _seen_in_implicit_step_on_belt(scene, view):
+    """Implement :func:`implicit.seen`: what ``_observe_on_belt`` in :mod:`record` takes."""
     _, (x, velocity, acceleration, friction, place, v, belt_acceleration, deflection) = view
     jumps = located(scene, x, acceleration)
     return x, velocity, friction, place, v, acceleration - belt_acceleration, jumps, deflection
 
 
 @implicit.sought.implements(belt.Belt, belt.BristleBelt)
-def _sought(scene, record, view):
+def _sought_on_belt(scene, record, view):
+    """Implement :func:`implicit.sought`: displacement, velocity, friction."""
     r, motion = record, view[1]
     place, velocity = (motion[0], r.x_min, r.x_max), (motion[1], -inf, r.velocity_max)
     return place, velocity, (motion[3], -r.force_max, r.force_max)
 
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
-def _near_zero(scene, motion):
+def _near_zero_on_belt(scene, motion):
+    """Implement :func:`implicit.near_zero`: a twentieth of the weight for the reaction, nothing for the others."""
     return all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0)
 
 
 @modes.row.implements(belt.Belt, belt.BristleBelt)
-def _row(scene, mode, forcing, y, seen):
+def _row_on_belt(scene, mode, forcing, y, seen):
+    """Implement :func:`modes.row`: displacement, velocity, friction, deflection, and -1, 0 or 1 for the mode."""
     x, velocity, friction = seen[:3]
     return x, velocity, friction, deflection(y, 0.0), 0.0 if mode.region < 0 else float(mode.sign)

@@ -118,6 +118,7 @@ def stuck_gradient(scene, x):
 
 @feature("0.0", of=ring.having(OnBelt, "cubic"))
 def _cubic_stiffness(body):
+    """Coefficient of the cubic spring, N/m^3; 0 if the scene has none."""
     return body.cubic
 
 

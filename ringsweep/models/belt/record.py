@@ -220,12 +220,18 @@ def _first_time(scene):
 
 
 @recorder.lend.implements(Belt, BristleBelt)
-def _lend(scene, record, row):
+def _lend_on_belt(scene, record, row):
+    """Implement :func:`recorder.lend`: points of the section are stored in the row of the run."""
     return _with_section(record, section.lent(scene.section, record, row, (nan,)))
 
 
 @recorder.observe.implements(Belt, BristleBelt)
-def _observe(scene, record, t, duration, stuck, seen):
+def _observe_on_belt(scene, record, t, duration, stuck, seen):
+    """Implement :func:`recorder.observe`.
+
+    `seen` is displacement (m), velocity in space (m/s), friction (N), displacement relative to the belt (m), sliding
+    velocity (m/s) and its rate (m/s^2), ``shock.Located`` or an empty tuple, and deflection (m; NaN without bristles).
+    """
     # In most steps nothing turns, begins or ends.
     r = record
     x, velocity, force, place, v, v_rate, acceleration, deflection = seen
@@ -294,7 +300,8 @@ def _located(before, now):
 
 
 @lanes_body(_located)
-def _not_located(before, now):
+def _located_in_lanes(before, now):
+    """The last time itself, see :func:`_located`."""
     return before
 
 
@@ -304,7 +311,8 @@ def _rate(by_difference, v_rate):
 
 
 @lanes_body(_rate)
-def _by_difference(by_difference, v_rate):
+def _rate_in_lanes(by_difference, v_rate):
+    """The difference alone, see :func:`_rate`."""
     return by_difference
 
 
@@ -399,7 +407,8 @@ def _cycles(scene, r, stops, now, v, turn, span):
 
 
 @recorder.conclude.implements(Belt, BristleBelt)
-def _conclude(scene, record, status, t, place, velocity):
+def _conclude_on_belt(scene, record, status, t, place, velocity):
+    """Implement :func:`recorder.conclude`: the numbers of :class:`Outcome`, and what the scene asks for besides."""
     r, x = record, place
     if holds_in_band(scene.law) and r.band > 0.0:
         # The state holds the momentum, which moves nothing in a dead band.
@@ -555,16 +564,19 @@ def _without_return(parts, scene, r):
 
 
 @recorder.begin.implements(Belt)
-def _begin(scene, t, seen):
+def _begin_record_on_belt(scene, t, seen):
+    """Implement :func:`recorder.begin`, for the stiction band of the law."""
     return begin(scene, t, seen, stiction_band(scene.law), -1.0)
 
 
 @recorder.after_event.implements(Belt)
-def _after_event(scene, record, before, mode, t):
+def _after_event_on_belt(scene, record, before, mode, t):
+    """Implement :func:`recorder.after_event`: under a smooth law nothing jumps."""
     return _with_shocks(record, shock.without_jump(family(scene.law), record.shocks))
 
 
 @recorder.enter.implements(Belt, BristleBelt)
-def _enter(scene, record, t, seen):
+def _enter_record_on_belt(scene, record, t, seen):
+    """Implement :func:`recorder.enter`: extremes of friction, and jumps of the acceleration."""
     # Friction may jump at an event, and both limits count.
     return _entered(record, max(record.force_max, abs(seen[2])), shock.enter(record.shocks, t, seen[6]))

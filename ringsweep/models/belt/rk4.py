@@ -13,32 +13,38 @@ from ringsweep.physics.belt import Belt, BristleBelt
 
 
 @constant_step.initial_state.implements(Belt)
-def _initial_state(scene):
+def _initial_state_on_belt(scene):
+    """Implement :func:`constant_step.initial_state`: ``(x, velocity)``, m and m/s in space."""
     return scene.initial_x, scene.initial_v + drives.turn(scene.drive, 0.0)[1]
 
 
 @slip_in_space.implements(Belt)
-def _slip_in_space(scene, y, v, forcing, angle):
+def _slip_in_space_on_belt(scene, y, v, forcing, angle):
+    """Implement :func:`slip_in_space`; nothing is added to the slip."""
     return sliding(scene, y[0], moving(scene, y[1], v, forcing[1]), v, forcing), ()
 
 
 @constant_step.rates.implements(Belt, BristleBelt)
-def _rates(scene, now, y, forcing):
+def _rates_in_constant_step_on_belt(scene, now, y, forcing):
+    """Implement :func:`constant_step.rates`."""
     return rates(scene, y, forcing, ())
 
 
 @constant_step.inspect.implements(Belt, BristleBelt)
-def _inspect(scene, y, forcing):
+def _inspect_on_belt(scene, y, forcing):
+    """Implement :func:`constant_step.inspect`; the place is relative to the belt."""
     return inspection(scene, y, y[0] - forcing[0], forcing, ())
 
 
 @constant_step.seen.implements(Belt, BristleBelt)
-def _seen(scene, y, now):
+def _seen_in_constant_step_on_belt(scene, y, now):
+    """Implement :func:`constant_step.seen`: what ``_observe_on_belt`` in :mod:`record` takes."""
     # The record takes the rate of the sliding velocity from the differences of short steps.
     return y[0], now.motion[2], now.friction, now.place, moving(scene, now.v, now.v, 0.0), 0.0, (), nan
 
 
 @constant_step.row.implements(Belt, BristleBelt)
-def _row(scene, y, forcing):
+def _row_of_constant_step_on_belt(scene, y, forcing):
+    """Implement :func:`constant_step.row`: the same columns as :func:`modes.row` on the belt."""
     now = constant_step.inspect(scene, y, forcing)
     return y[0], now.motion[2], now.friction, deflection(y, 0.0), word_of_mode(scene, now)

@@ -75,18 +75,21 @@ class Mode(NamedTuple):
 
 
 @modes.in_space.implements(belt.Belt)
-def _in_space(scene, t, y):
+def _in_space_on_belt(scene, t, y):
+    """Implement :func:`modes.in_space`."""
     forcing = drives.turn(scene.drive, t)
     return y[0], moving(scene, y[1] + forcing[1], y[1], forcing[1])
 
 
 @series.table_shape.implements(belt.Belt)
-def _table_shape(scene):
+def _table_shape_on_belt(scene):
+    """Implement :func:`series.table_shape`; the reaction is a guard only if it varies."""
     return FAST + 1, ring.if_load_varies(scene.body, NORMAL, SLOW)
 
 
 @modes.begin.implements(belt.Belt)
-def _begin(scene):
+def _begin_on_belt(scene):
+    """Implement :func:`modes.begin`; the state is ``(x, v)``."""
     t, x = drives.beginning(scene.drive), scene.initial_x
     v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
     status, mode = RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
@@ -122,7 +125,8 @@ def _loose(scene, sign):
 
 
 @modes.switch.implements(belt.Belt)
-def _switch(scene, mode, guard, t, y):
+def _switch_on_belt(scene, mode, guard, t, y):
+    """Implement :func:`modes.switch`; `guard` is NORMAL, SLOW or FAST."""
     x, _ = y
     if guard == NORMAL:
         return SEPARATED_1, mode, y
@@ -176,7 +180,8 @@ def _friction_term(body, c, k, K, load):
 
 
 @series.expand.implements(belt.Belt)
-def _expand(scene, mode, t, y, tolerance, c):
+def _expand_on_belt(scene, mode, t, y, tolerance, c):
+    """Implement :func:`series.expand`: fill all rows of the table, in stick, in a dead band, or in slip."""
     drives.expand_at(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
     body = scene.body
     if if_force(body, True, False):
@@ -235,6 +240,7 @@ def _expand(scene, mode, t, y, tolerance, c):
 
 @inlined
 def _has_dead_band(scene):
+    """Whether a set-valued law holds the body at all sliding speeds below a positive bound, as Karnopp's does."""
     return holds_in_band(scene.law) and stiction_band(scene.law) > 0.0
 
 
@@ -291,7 +297,8 @@ def _expand_slip(scene, mode, viscous, c):
 
 
 @series.seen_at_start.implements(belt.Belt)
-def _seen_at_start(scene, c):
+def _seen_at_start_on_belt(scene, c):
+    """Implement :func:`series.seen_at_start`: what ``_observe_on_belt`` in :mod:`record` takes."""
     acceleration = located(scene, c[X, 0], c[ACCELERATION, 0])
     v = _seen_sliding(scene, c[V, 0], c[VELOCITY, 0] - c[SHIFT, 1])
     return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], v, c[V, 1], acceleration, nan
@@ -304,7 +311,8 @@ def _seen_sliding(scene, v, difference):
 
 
 @series.seen_at.implements(belt.Belt)
-def _seen_at(scene, mode, c, s, h):
+def _seen_at_on_belt(scene, mode, c, s, h):
+    """Implement :func:`series.seen_at`: what ``_observe_on_belt`` in :mod:`record` takes."""
     velocity = value(c[VELOCITY], s)
     if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
@@ -322,7 +330,8 @@ def _seen_at(scene, mode, c, s, h):
 
 
 @series.extremes.implements(belt.Belt)
-def _extremes(scene, record, mode, c, h, work):
+def _extremes_on_belt(scene, record, mode, c, h, work):
+    """Implement :func:`series.extremes`: of displacement, velocity and friction; and the ends of cycles."""
     # Look for an extreme only if it could exceed the recorded one.
     count, change = 0, variation(c[VELOCITY], h)
     if abs(c[VELOCITY, 0]) <= change:

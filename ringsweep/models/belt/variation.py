@@ -20,34 +20,40 @@ _SMALL = 1e-4
 
 
 @variation.due.implements(Belt, BristleBelt)
-def _due(scene, record):
+def _due_on_belt(scene, record):
+    """Implement :func:`variation.due`: the end of the cycle, or the next point of the section."""
     return min(_end_of_cycle(scene.asked, record), section.due(scene.section, record))
 
 
 @feature("inf")
 def _end_of_cycle(asked, record):
+    """Time at which the cycle ends, s; infinite if no exponent is asked for."""
     return record.cycles.next
 
 
 @variation.enter.implements(Belt)
-def _enter(scene, record, mode, rates):
+def _enter_tangent_on_belt(scene, record, mode, rates):
+    """Implement :func:`variation.enter`; stick keeps no disturbance of the sliding velocity."""
     # A body stays in a dead band at any velocity in it; only one that comes from outside has that of the edge.
     arrives = stiction_band(scene.law) == 0.0 or record.tangent.gradient[1] != 0.0
     return with_tangent(record, tangent.enter(record.tangent, 0.0 if mode.sign == 0 and arrives else 1.0, rates))
 
 
 @variation.enter.implements(BristleBelt)
-def _enter_with_bristles(scene, record, mode, rates):
+def _enter_tangent_on_bristle_belt(scene, record, mode, rates):
+    """Implement :func:`variation.enter`; bristles keep all disturbances."""
     return with_tangent(record, tangent.enter(record.tangent, 1.0, rates))
 
 
 @variation.advance.implements(Belt, BristleBelt)
-def _advance(scene, record, h, rates, weights, work):
+def _advance_tangent_on_belt(scene, record, h, rates, weights, work):
+    """Implement :func:`variation.advance`."""
     return with_tangent(record, tangent.advance(record.tangent, h, rates, weights, work))
 
 
 @variation.switched.implements(Belt, BristleBelt)
-def _switched(scene, record, mode, guard, t, y):
+def _switch_tangent_on_belt(scene, record, mode, guard, t, y):
+    """Implement :func:`variation.switched`."""
     rates = record.tangent.rates
     return with_tangent(record, tangent.switched(record.tangent, _gradient(scene, mode, guard, t, y, rates)))
 
@@ -58,7 +64,8 @@ def _gradient(scene, mode, guard, t, y, rates):
 
 
 @_gradient.implements(Belt)
-def _gradient_of_guard(scene, mode, guard, t, y, rates):
+def _gradient_on_belt(scene, mode, guard, t, y, rates):
+    """Implement :func:`_gradient`, by the formulas of breakaway and of the bounds of a region."""
     yields = holds_in_band(scene.law) and mode.region < 0 and guard == SLOW
     if mode.sign != 0 and not yields:
         return 0.0, 1.0 / rates[1] if rates[1] != 0.0 else 0.0
@@ -74,7 +81,8 @@ def _gradient_of_guard(scene, mode, guard, t, y, rates):
 
 
 @_gradient.implements(BristleBelt)
-def _gradient_of_bristle_guard(scene, mode, guard, t, y, rates):
+def _gradient_on_bristle_belt(scene, mode, guard, t, y, rates):
+    """Implement :func:`_gradient`, by differences for the guard of the bristles."""
     _, v, z = y
     by_v, by_z = 1.0, 0.0
     if ring.if_load_varies(scene.body, guard - 1, guard) == 1:
