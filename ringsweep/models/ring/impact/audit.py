@@ -40,7 +40,8 @@ _ON_EDGE = 1e-8
 
 
 @audit.violation.implements(ImpactRing)
-def _violation(scene, mode, forcing, y, rates, s, tolerance):
+def _violation_with_impact(scene, mode, forcing, y, rates, s, tolerance):
+    """Implement :func:`audit.violation`: as on the ring while both contacts hold; open gaps must not be negative."""
     contacts = mode.contacts
     if contacts.open == NONE:
         closed = ring_of(scene, contacts.turned)
@@ -52,12 +53,13 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
             largest = larger(largest, -contact_of(scene.balls, contact, motion).gap / allowed)
     if contacts.open == BOTH:
         return largest, 0.0
-    violation, power = _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance)
+    violation, power = _violation_of_pivot(scene, mode, forcing, y, rates, s, tolerance)
     return larger(largest, violation), power
 
 
 @inlined
-def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
+def _violation_of_pivot(scene, mode, forcing, y, rates, s, tolerance):
+    """Violation and power of a pivot; arguments and results as for :func:`audit.violation`."""
     body, balls = scene.closed.body, scene.balls
     theta, ring_omega, ring_epsilon = forcing
     f = frame(scene, y, ring_omega)
@@ -93,7 +95,8 @@ def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
 
 
 @audit.energy.implements(ImpactRing)
-def _energy(scene, forcing, y):
+def _energy_with_impact(scene, forcing, y):
+    """Implement :func:`audit.energy`."""
     body, motion = scene.closed.body, motion_of(scene, y, forcing[1])
     spin = 0.0 if ring.contact_count(body) == 1 else inertia(body) * motion.psi_dot * motion.psi_dot
     speed = motion.x_dot * motion.x_dot + motion.y_dot * motion.y_dot
@@ -105,12 +108,14 @@ _MOST_VIOLATION = 1e-9
 
 
 @audit.is_reaction.implements(ImpactRing)
-def _is_reaction(scene, guard):
+def _is_reaction_with_impact(scene, guard):
+    """Implement :func:`audit.is_reaction`; the guard of an open contact, its gap, counts as one."""
     return audit.is_reaction(scene.closed, guard)
 
 
 @audit.undecided.implements(ImpactRing)
-def _undecided(batch, one, other, fall_rates):
+def _undecided_with_impact(batch, one, other, fall_rates):
+    """Implement :func:`audit.undecided`; every contact that has been open counts as separated."""
     return undecided_on_contacts(batch.closed, _all_lost(one), _all_lost(other), fall_rates)
 
 
@@ -126,18 +131,21 @@ _DISTURBANCE = 1e-14
 
 
 @audit.disturbed.implements(ImpactRing)
-def _disturbed(batch):
+def _disturbed_restitution(batch):
+    """Implement :func:`audit.disturbed`."""
     return batch._replace(restitution=batch.restitution * (1.0 - _DISTURBANCE))
 
 
 @audit.least_scales.implements(ImpactRing)
-def _least_scales(batch):
+def _least_scales_with_impact(batch):
+    """Implement :func:`audit.least_scales`: those of the ring, and of lengths, speeds, impulses and energies."""
     body, reach, scales = batch.closed.body, batch.balls.reach, rates_and_times(batch.closed)
     speed = reach * (scales["rad s-1"] + np.sqrt(body.gravity / reach))
     return scales | {"m": reach, "m s-1": speed, "N s": body.mass * speed, "J": body.mass * speed * speed}
 
 
 @audit.of_events.implements(ImpactRing)
-def _of_events(batch, one):
+def _of_impacts(batch, one):
+    """Implement :func:`audit.of_events`."""
     # Each loss of a contact ends with rebounds that are summed.
     return ~(one.impact_violation <= _MOST_VIOLATION), one.impacts > 0.0, SUMMED * one.separations

@@ -36,28 +36,33 @@ _BEYOND = 1e-12
 
 
 @implicit.to_implicit.implements(ImpactRing)
-def _to_implicit(scene, forcing, y):
+def _to_implicit_with_impact(scene, forcing, y):
+    """Implement :func:`implicit.to_implicit`: ``(psi - theta, v, eta, eta_dot, code)``."""
     return y[0] - forcing[0], y[1], y[2], y[3], y[-1]
 
 
 @implicit.from_implicit.implements(ImpactRing)
-def _from_implicit(scene, forcing, x):
+def _from_implicit_with_impact(scene, forcing, x):
+    """Implement :func:`implicit.from_implicit`."""
     return x[0] + forcing[0], x[1], x[2], x[3], 0.0, 0.0, 0.0, 0.0, x[4]
 
 
 @implicit.common.implements(ImpactRing)
-def _common(scene, mode, forcing, x):
+def _common_with_impact(scene, mode, forcing, x):
+    """Implement :func:`implicit.common`, for the steps of the closed ring."""
     return implicit.common(ring_of(scene, mode.contacts.turned), mode, forcing, (x[0], x[1]))
 
 
 @implicit.is_stiff.implements(ImpactRing)
-def _is_stiff(scene, mode, y, linear):
+def _is_stiff_with_impact(scene, mode, y, linear):
+    """Implement :func:`implicit.is_stiff`."""
     # A gap that has just opened grows from zero: its first step is a series.
     return y[2] != 0.0 and implicit.is_stiff(scene.closed, mode, y, linear)
 
 
 @implicit.error_scales.implements(ImpactRing)
-def _error_scales(scene, tolerance, x):
+def _error_scales_with_impact(scene, tolerance, x):
+    """Implement :func:`implicit.error_scales`; the code of the contacts has no error."""
     place, speed, _ = implicit.error_scales(scene.closed, tolerance, (x[0], x[1]))
     gap = tolerance * _GAP_TOLERANCE
     return (
@@ -79,27 +84,31 @@ def _friction(scene, mode, v):
 
 
 @inlined
-def _frame(scene, forcing, x):
+def _frame_of_implicit(scene, forcing, x):
+    """The :class:`Frame` of the pivot in the state `x` of an implicit step."""
     return frame(scene, implicit.from_implicit(scene, forcing, x), forcing[1])
 
 
 @inlined
 def _rates_from(scene, forcing, x, f, found):
+    """Rates of the state `x`, from the solution `found` of the balances of the pivot `f`."""
     v_dot = pivot.sliding_acceleration(f, found, scene.closed.body.radius * forcing[2])
     turning = (x[1] + scene.balls.reach * x[3]) / scene.closed.body.radius
     return turning, v_dot, x[3], found[0] - found[1], 0.0
 
 
 @implicit.rates.implements(ImpactRing)
-def _rates(scene, mode, common, forcing, x):
-    f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, x[1])
+def _rates_with_impact(scene, mode, common, forcing, x):
+    """Implement :func:`implicit.rates` in a pivot."""
+    f, (K, _) = _frame_of_implicit(scene, forcing, x), _friction(scene, mode, x[1])
     return _rates_from(scene, forcing, x, f, pivot.in_slip(f, K))
 
 
 @implicit.linearise.implements(ImpactRing)
-def _linearise(scene, mode, common, t, forcing, x):
+def _linearise_with_impact(scene, mode, common, t, forcing, x):
+    """Implement :func:`implicit.linearise` in a pivot."""
     nothing, (_, ring_omega, ring_epsilon) = (0.0, 0.0, 0.0, 0.0), forcing
-    f, friction = _frame(scene, forcing, x), _friction(scene, mode, x[1])
+    f, friction = _frame_of_implicit(scene, forcing, x), _friction(scene, mode, x[1])
     found = pivot.in_slip(f, friction[0])
     # Columns of the Jacobian, and the derivative by time at a constant state.
     by_place = _derivative(scene, f, friction, found, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -141,14 +150,19 @@ def _derivative(scene, f, friction, found, state, forcing):
 
 
 @implicit.guards_and_motion.implements(ImpactRing)
-def _guards_and_motion(scene, mode, common, forcing, x):
+def _guards_and_motion_with_impact(scene, mode, common, forcing, x):
+    """Implement :func:`implicit.guards_and_motion`.
+
+    The motion is psi, its rate and its acceleration, then what :func:`implicit.seen` and :func:`implicit.near_zero`
+    return. The guard of an open contact is its gap.
+    """
     body, contacts = scene.closed.body, mode.contacts
     if contacts.open == NONE:
         closed = ring_of(scene, contacts.turned)
         view = implicit.guards_and_motion(closed, mode, common, forcing, (x[0], x[1]))
         shown = joined(implicit.seen(closed, view), (0.0, 0.0, 0.0))
         return view[0], (view[1][0], view[1][1], view[1][2], shown, implicit.near_zero(closed, view[1]))
-    f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, x[1])
+    f, (K, _) = _frame_of_implicit(scene, forcing, x), _friction(scene, mode, x[1])
     psi_dd, _, normal, _ = pivot.in_slip(f, K)
     gap, speed, (low, high) = gap_measure(scene, mode, x[2]), mode.sign * x[1], region_bounds(scene.law, mode.region)
     above, below = distances_to_edges(scene, mode, f.alpha - forcing[0])
@@ -166,17 +180,20 @@ def _guards_and_motion(scene, mode, common, forcing, x):
 
 
 @implicit.near_zero.implements(ImpactRing)
-def _near_zero(scene, motion):
+def _near_zero_with_impact(scene, motion):
+    """Implement :func:`implicit.near_zero`."""
     return motion[4]
 
 
 @implicit.seen.implements(ImpactRing)
-def _seen(scene, view):
+def _seen_in_implicit_step_with_impact(scene, view):
+    """Implement :func:`implicit.seen`: what ``_observe_with_impact`` in :mod:`record` takes."""
     return view[1][3]
 
 
 @implicit.sought.implements(ImpactRing)
-def _sought(scene, record, view):
+def _sought_with_impact(scene, record, view):
+    """Implement :func:`implicit.sought`: as on the ring, and both gaps."""
     psi, psi_dot, normal_1, normal_2, _, gap_1, gap_2, _ = view[1][3]
     most = record.gap_max
     return (*sought(record.base, psi, psi_dot, normal_1, normal_2), (gap_1, 0.0, most), (gap_2, 0.0, most))

@@ -12,7 +12,8 @@ from ringsweep.physics.impact import ImpactRing
 
 
 @balance.implements(ImpactRing)
-def _balance(scene, mode, t, y, v):
+def _balance_of_pivot(scene, mode, t, y, v):
+    """Implement :func:`balance`."""
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     f = frame(scene, (y[0], v, *y[2:]), ring_omega)
     K, _ = friction(scene, mode, v)
@@ -25,7 +26,8 @@ def _balance(scene, mode, t, y, v):
 
 
 @modes.limit_of_jam.implements(ImpactRing)
-def _limit_of_jam(scene, mode, t, y):
+def _limit_of_jam_with_impact(scene, mode, t, y):
+    """Implement :func:`modes.limit_of_jam`."""
     contacts = mode.contacts
     if contacts.open == NONE:
         s, (_, v), normals = modes.limit_of_jam(ring_of(scene, contacts.turned), mode, t, (y[0], y[1]))
@@ -37,5 +39,6 @@ def _limit_of_jam(scene, mode, t, y):
 
 
 @recorder.at_jam.implements(ImpactRing)
-def _at_jam(scene, record, normals, velocity):
+def _at_jam_with_impact(scene, record, normals, velocity):
+    """Implement :func:`recorder.at_jam`."""
     return with_base(record, recorder.at_jam(scene.closed, record.base, normals, velocity))

@@ -89,13 +89,18 @@ _with_lost = replacing("lost")
 
 
 @recorder.begin.implements(ImpactRing)
-def _begin(scene, t, seen):
+def _begin_record_with_impact(scene, t, seen):
+    """Implement :func:`recorder.begin`: both contacts hold."""
     nothing = Lost(0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
     return Record(recorder.begin(scene.closed, t, seen[:5]), 0.0, 0.0, 0.0, nothing)
 
 
 @recorder.observe.implements(ImpactRing)
-def _observe(scene, record, t, duration, stuck, seen):
+def _observe_with_impact(scene, record, t, duration, stuck, seen):
+    """Implement :func:`recorder.observe`.
+
+    `seen` is what ``_observe_on_ring`` takes, then the measures of both gaps (m) and the number of the open contacts.
+    """
     r, contacts = record, seen[7]
     base = recorder.observe(scene.closed, r.base, t, duration, stuck, seen[:5])
     gap_max, open_for = max(r.gap_max, max(seen[5], seen[6])), (duration if contacts > 0.0 else 0.0)
@@ -104,17 +109,20 @@ def _observe(scene, record, t, duration, stuck, seen):
 
 
 @recorder.enter.implements(ImpactRing)
-def _enter(scene, record, t, seen):
+def _enter_record_with_impact(scene, record, t, seen):
+    """Implement :func:`recorder.enter`."""
     return with_base(record, recorder.enter(scene.closed, record.base, t, seen[:5]))
 
 
 @inlined
-def _count(contacts):
+def _count_of(contacts):
+    """How many contacts NONE, FIRST, SECOND or BOTH are."""
     return float(contacts % 2 + contacts // 2)
 
 
 @recorder.after_event.implements(ImpactRing)
-def _after_event(scene, record, before, mode, t):
+def _after_event_with_impact(scene, record, before, mode, t):
+    """Implement :func:`recorder.after_event`: losses, impacts, tumbles, recovery, and the word of events."""
     r, contacts = record.lost, mode.contacts
     event = contacts.event
     if event.number == r.number:
@@ -142,8 +150,8 @@ def _after_event(scene, record, before, mode, t):
         float(event.number),
         (r.word * 512.0 + code * _BASE) % _PRIME,
         max(r.violation, event.violation),
-        r.separations + _count(int(lost)),
-        r.impacts + _count(hit),
+        r.separations + _count_of(int(lost)),
+        r.impacts + _count_of(hit),
         max(r.impact_speed_max, event.speed),
         max(r.impulse_max, event.impulse),
         r.impact_loss + event.loss,
@@ -154,7 +162,8 @@ def _after_event(scene, record, before, mode, t):
 
 
 @recorder.conclude.implements(ImpactRing)
-def _conclude(scene, record, status, t, place, velocity):
+def _conclude_with_impact(scene, record, status, t, place, velocity):
+    """Implement :func:`recorder.conclude`: the outcome of the ring at the first loss, then what followed."""
     r = record.lost
     # A jam after a loss ends the run, whose regime is that of the loss.
     ended = COMPLETE if status == JAM and r.first > 0.0 else status

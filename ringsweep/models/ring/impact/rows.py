@@ -19,7 +19,8 @@ EVENT = ("number", "time", "event", "contact", "speed", "impulse")
 
 
 @modes.row.implements(ImpactRing)
-def _row(scene, mode, forcing, y, seen):
+def _row_with_impact(scene, mode, forcing, y, seen):
+    """Implement :func:`modes.row`: the columns :data:`HISTORY`, then :data:`EVENT`."""
     psi, rate, normal_1, normal_2, located = seen[0], seen[1], seen[2], seen[3], seen[4]
     contacts, (theta, ring_omega, _) = mode.contacts, forcing
     event = contacts.event

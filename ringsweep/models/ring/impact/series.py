@@ -81,12 +81,14 @@ _ON_EDGE = 1e-12
 
 
 @series.table_shape.implements(ImpactRing)
-def _table_shape(scene):
+def _table_shape_with_impact(scene):
+    """Implement :func:`series.table_shape`."""
     return series.table_shape(scene.closed)
 
 
 @series.expand.implements(ImpactRing)
-def _expand(scene, mode, t, y, tolerance, c):
+def _expand_with_impact(scene, mode, t, y, tolerance, c):
+    """Implement :func:`series.expand`: as the closed ring, as a pivot, or as a flight."""
     c[KIND, 0] = y[-1]
     if mode.contacts.open == NONE:
         return series.expand(ring_of(scene, mode.contacts.turned), mode, t, (y[0], y[1]), tolerance, c)
@@ -105,22 +107,26 @@ _with_base = replacing("base")
 
 
 @simpler.kind.implements(ImpactRing)
-def _kind(scene):
+def _kind_with_impact(scene):
+    """Implement :func:`simpler.kind`: while both contacts hold, the closed ring takes the steps."""
     return simpler.Parted()
 
 
 @simpler.is_simpler.implements(ImpactRing)
-def _is_simpler(scene, mode):
+def _is_closed(scene, mode):
+    """Implement :func:`simpler.is_simpler`: both contacts hold."""
     return mode.contacts.open == NONE
 
 
 @simpler.part.implements(ImpactRing)
-def _part(scene, record, mode, y):
+def _part_of_closed(scene, record, mode, y):
+    """Implement :func:`simpler.part`: the closed ring, its record, and ``(phi, v)``."""
     return ring_of(scene, mode.contacts.turned), record.base, (y[0], y[1])
 
 
 @simpler.rejoined.implements(ImpactRing)
-def _rejoined(scene, record, mode, part_record, y, c):
+def _rejoined_with_impact(scene, record, mode, part_record, y, c):
+    """Implement :func:`simpler.rejoined`."""
     state = state_when_closed(y[0], y[1], mode.contacts.turned)
     c[KIND, 0] = state[-1]
     return _with_base(record, part_record), state
@@ -131,6 +137,7 @@ def _rejoined(scene, record, mode, part_record, y, c):
 
 @inlined
 def _fill_constant(row, number):
+    """Make a row of the table the series of a constant."""
     row[0] = number
     for k in range(1, ORDER + 1):
         row[k] = 0.0
@@ -138,6 +145,7 @@ def _fill_constant(row, number):
 
 @inlined
 def _expand_pivot(scene, mode, t, y, tolerance, c):
+    """Fill the series of a pivot and return what :func:`series.expand` does."""
     body, balls = scene.closed.body, scene.balls
     fresh = (mode.contacts.zeros_1 if mode.contacts.open == FIRST else mode.contacts.zeros_2) if y[2] == 0.0 else 0
     c[PHI, 0], c[V, 0], c[ETA, 0] = y[0], y[1], y[2]
@@ -350,6 +358,7 @@ def _leading_zeros(gap, zeros, least_rate):
 
 @inlined
 def _is_particle_in_flight(scene, contacts):
+    """Whether a body of one contact is in flight: its angle psi is that of its place."""
     return contacts == BOTH and ring.contact_count(scene.closed.body) == 1
 
 
@@ -365,7 +374,8 @@ def _polar(scene, c, s):
 
 
 @series.state_at.implements(ImpactRing)
-def _state_at(scene, c, s):
+def _state_at_with_impact(scene, c, s):
+    """Implement :func:`series.state_at`; :mod:`mode` says what the nine numbers are."""
     contacts, code = int(c[KIND, 0]) % TURNED, c[KIND, 0]
     psi = value(c[PHI], s)
     if contacts == NONE:
@@ -381,7 +391,8 @@ def _state_at(scene, c, s):
 
 
 @series.rates_at.implements(ImpactRing)
-def _rates_at(scene, c, s):
+def _rates_at_with_impact(scene, c, s):
+    """Implement :func:`series.rates_at`."""
     contacts = int(c[KIND, 0]) % TURNED
     psi_dot = slope(c[PHI], s)
     if contacts == BOTH:
@@ -401,7 +412,7 @@ def _value(row, s):
 
 
 @inlined
-def _seen(scene, c, s):
+def _seen_in_series(scene, c, s):
     """What the recorder is shown: psi, its rate, both reactions, the acceleration, both gaps, and the open contacts."""
     body = scene.closed.body
     contacts = int(c[KIND, 0]) % TURNED
@@ -419,17 +430,20 @@ def _seen(scene, c, s):
 
 
 @series.seen_at_start.implements(ImpactRing)
-def _seen_at_start(scene, c):
-    return _seen(scene, c, 0.0)
+def _seen_at_start_with_impact(scene, c):
+    """Implement :func:`series.seen_at_start`."""
+    return _seen_in_series(scene, c, 0.0)
 
 
 @series.seen_at.implements(ImpactRing)
-def _seen_at(scene, mode, c, s, h):
-    return _seen(scene, c, s)
+def _seen_at_with_impact(scene, mode, c, s, h):
+    """Implement :func:`series.seen_at`."""
+    return _seen_in_series(scene, c, s)
 
 
 @series.extremes.implements(ImpactRing)
-def _extremes(scene, record, mode, c, h, work):
+def _extremes_with_impact(scene, record, mode, c, h, work):
+    """Implement :func:`series.extremes`: of the gaps; in a pivot also of psi, its rate and the reaction."""
     base, count = record.base, 0
     for row, is_open in (
         (GAP_1, mode.contacts.open % 2 == 1),

@@ -191,7 +191,8 @@ def _taken_along(scene, t, wedged):
 
 
 @modes.begin.implements(ImpactRing)
-def _begin(scene):
+def _begin_with_impact(scene):
+    """Implement :func:`modes.begin`: as on the closed ring; a contact may be lost at once."""
     t, (phi, v), status, mode = modes.begin(scene.closed)
     now = Instant(t, 0.0)
     event = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, parts(now)[0], 0)
@@ -206,7 +207,12 @@ def _begin(scene):
 
 
 @modes.switch.implements(ImpactRing)
-def _switch(scene, mode, guard, t, y):
+def _switch_with_impact(scene, mode, guard, t, y):
+    """Implement :func:`modes.switch`.
+
+    While both contacts hold, the closed ring decides. The guard of a contact is its reaction while it holds, and its
+    gap while it is open.
+    """
     contacts = mode.contacts
     if contacts.open == NONE:
         status, after, (_, v) = modes.switch(ring_of(scene, contacts.turned), mode, guard, t, (y[0], y[1]))
@@ -619,7 +625,8 @@ def _close(scene, t, psi, v, turned, event):
 
 
 @modes.status_when_stalled.implements(ImpactRing)
-def _status_when_stalled(scene, mode, t, y):
+def _status_when_stalled_with_impact(scene, mode, t, y):
+    """Implement :func:`modes.status_when_stalled`."""
     if mode.contacts.open == NONE:
         return modes.status_when_stalled(ring_of(scene, mode.contacts.turned), mode, t, (y[0], y[1]))
     if mode.contacts.open == BOTH or mode.sign == 0:
@@ -632,16 +639,19 @@ def _status_when_stalled(scene, mode, t, y):
 
 
 @modes.sticks.implements(ImpactRing)
-def _sticks(scene, mode):
+def _sticks_with_impact(scene, mode):
+    """Implement :func:`modes.sticks`: never in a pivot, whose body turns."""
     return mode.contacts.open == NONE and (mode.sign == 0 or mode.region < 0)
 
 
 @modes.first_loss.implements(ImpactRing)
-def _first_loss(scene, before, after):
+def _is_first_loss(scene, before, after):
+    """Implement :func:`modes.first_loss`."""
     return before.contacts.event.number == 0 and after.contacts.event.number > 0
 
 
 @modes.in_space.implements(ImpactRing)
-def _in_space(scene, t, y):
+def _in_space_with_impact(scene, t, y):
+    """Implement :func:`modes.in_space`: psi and its rate."""
     motion = motion_of(scene, y, drives.turn(scene.drive, t)[1])
     return motion.psi, motion.psi_dot
