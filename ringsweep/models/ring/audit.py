@@ -50,7 +50,8 @@ def _names_wrong_segment(scene, mode, rho, under):
 
 
 @audit.violation.implements(ring.Ring)
-def _violation(scene, mode, forcing, y, rates, s, tolerance):
+def _violation_on_ring(scene, mode, forcing, y, rates, s, tolerance):
+    """Implement :func:`audit.violation` for laws of the velocity."""
     body = scene.body
     phi, v = y
     theta, ring_omega, ring_epsilon = forcing
@@ -83,12 +84,14 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
 
 
 @audit.energy.implements(ring.Ring)
-def _energy(scene, forcing, y):
+def _energy_on_ring(scene, forcing, y):
+    """Implement :func:`audit.energy`."""
     return ring.energy(scene.body, (sin(y[0]), cos(y[0]), y[1] / scene.body.radius + forcing[1]))
 
 
 @audited.implements(ring.BristleRing)
-def _audited(scene, mode, forcing, y):
+def _audited_on_bristle_ring(scene, mode, forcing, y):
+    """Implement :func:`audited`; a mode that names another segment than the one under a contact is a violation."""
     rho, v, _, _ = y
     body, phi, omega = scene.body, rho + forcing[0], v / scene.body.radius + forcing[1]
     under, sign = ring.coefficients_at(scene, rho), 1.0 if v >= 0.0 else -1.0
@@ -98,7 +101,8 @@ def _audited(scene, mode, forcing, y):
 
 
 @audit.energy.implements(ring.BristleRing)
-def _bristle_energy(scene, forcing, y):
+def _energy_on_bristle_ring(scene, forcing, y):
+    """Implement :func:`audit.energy`; the place in the state is the angle in the ring's frame."""
     phi = y[0] + forcing[0]
     return ring.energy(scene.body, (sin(phi), cos(phi), y[1] / scene.body.radius + forcing[1]))
 
@@ -124,7 +128,8 @@ def rates_and_times(batch):
 
 
 @audit.is_reaction.implements(ring.Ring, ring.BristleRing)
-def _is_reaction(scene, guard):
+def _is_reaction_on_ring(scene, guard):
+    """Implement :func:`audit.is_reaction`; DETERMINANT, the guard of a jam, is none."""
     return guard in (NORMAL_1, NORMAL_2)
 
 

@@ -79,13 +79,15 @@ def _initial_deflections(scene):
 
 
 @constant_step.initial_state.implements(BristleRing)
-def _initial_state_in_space(scene):
+def _initial_state_on_bristle_ring(scene):
+    """Implement :func:`constant_step.initial_state`: ``(phi, omega, z_1, z_2)``; rad, rad/s, m."""
     z_1, z_2 = _initial_deflections(scene)
     return scene.initial_phi, scene.initial_omega, z_1, z_2
 
 
 @slip_in_space.implements(BristleRing)
-def _slip_in_space(scene, y, v, forcing, angle):
+def _slip_in_space_on_bristle_ring(scene, y, v, forcing, angle):
+    """Implement :func:`slip_in_space`; what it adds to the slip is 1 if the body counts as stuck, else 0."""
     rho, _, z_1, z_2 = y[0] - forcing[0], y[1], y[2], y[3]
     sign, under = select(v >= 0.0, 1.0, -1.0), ring.coefficients_at(scene, rho)
     stuck = select(_region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0, 1.0, 0.0)
@@ -93,7 +95,8 @@ def _slip_in_space(scene, y, v, forcing, angle):
 
 
 @modes.begin.implements(BristleRing)
-def _begin(scene):
+def _begin_on_bristle_ring(scene):
+    """Implement :func:`modes.begin`; the state is ``(rho, v, z_1, z_2)``."""
     t = drives.beginning(scene.drive)
     rho = scene.initial_phi - drives.turn(scene.drive, t)[0]
     v = drives.velocity_at_beginning(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
@@ -111,18 +114,21 @@ def _begin(scene):
 
 
 @friction_and_motion.implements(BristleRing)
-def _friction_and_motion(scene, mode, t, y):
+def _friction_and_motion_on_bristle_ring(scene, mode, t, y):
+    """Implement :func:`friction_and_motion`."""
     now = slip_at(scene, mode, t, y)
     return now.K, now.motion
 
 
 @modes.status_when_stalled.implements(BristleRing)
-def _status_when_stalled(scene, mode, t, y):
+def _status_when_stalled_on_bristle_ring(scene, mode, t, y):
+    """Implement :func:`modes.status_when_stalled`."""
     return JAM if is_jamming(scene, mode, t, y) else BROKEN
 
 
 @modes.switch.implements(BristleRing)
-def _switch(scene, mode, guard, t, y):
+def _switch_on_bristle_ring(scene, mode, guard, t, y):
+    """Implement :func:`modes.switch`; SLOW: v changes its sign; FAST: the bristles yield or hold again."""
     if guard == DETERMINANT:
         return JAM, mode, y
     if guard in (NORMAL_1, NORMAL_2):
@@ -136,21 +142,24 @@ def _switch(scene, mode, guard, t, y):
 
 
 @slip.implements(BristleRing)
-def _slip(scene, mode, common, forcing, x):
+def _slip_of_bristle_ring(scene, mode, common, forcing, x):
+    """Implement :func:`slip`; `x` is ``(rho, v, z_1, z_2)``, `common` is :class:`creep.Common`."""
     sine_cosine = sine_cosine_from(x[0] + forcing[0], common.phi, common.sin_phi, common.cos_phi)
     motion = *sine_cosine, x[1] * common.per_radius + forcing[1]
     return slip_of(scene, common.surfaces, motion, x, float(mode.sign), mode.region)
 
 
 @region_guards.implements(BristleRing)
-def _region_guards(scene, mode, common, x):
+def _region_guards_on_bristle_ring(scene, mode, common, x):
+    """Implement :func:`region_guards`: the sliding speed, m/s, and the guard of the bristles."""
     _, v, z_1, z_2 = x
     sign = float(mode.sign)
     return sign * v, _region_guard(scene, common.surfaces, v, z_1, z_2, sign, mode.region)
 
 
 @implicit.error_scales.implements(BristleRing)
-def _error_scales(scene, tolerance, x):
+def _error_scales_on_bristle_ring(scene, tolerance, x):
+    """Implement :func:`implicit.error_scales`, from the largest deflection that friction can hold."""
     mu, _ = roughest(scene.surface)
     deflection = mu / scene.law.sigma0
     # Without gravity the load is that of a slow rotation.
@@ -160,6 +169,7 @@ def _error_scales(scene, tolerance, x):
 
 
 @modes.in_space.implements(BristleRing)
-def _in_space(scene, t, y):
+def _in_space_on_bristle_ring(scene, t, y):
+    """Implement :func:`modes.in_space`: phi and omega."""
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     return y[0] + theta, y[1] / scene.body.radius + ring_omega

@@ -46,13 +46,15 @@ class Common(NamedTuple):
 
 
 @implicit.common.implements(ring.Ring, ring.BristleRing)
-def _common(scene, mode, forcing, x):
+def _common_on_ring(scene, mode, forcing, x):
+    """Implement :func:`implicit.common`."""
     phi = x[0] + forcing[0]
     return Common(x[0], phi, sin(phi), cos(phi), 1.0 / scene.body.radius, coefficients_under(scene, mode))
 
 
 @slip.implements(ring.Ring)
-def _slip(scene, mode, common, forcing, x):
+def _slip_of_ring(scene, mode, common, forcing, x):
+    """Implement :func:`slip`; `x` is ``(rho, v)``, rad and m/s."""
     sign, place_rate = 1.0 if x[1] >= 0.0 else -1.0, x[1] * common.per_radius
     mu_1, mu_2, slope_1, slope_2 = friction_in(scene.law, mode.region, abs(x[1]), common.surfaces)
     sin_phi, cos_phi = _sine_cosine(common, forcing, x)
@@ -73,18 +75,24 @@ def _sine_cosine(common, forcing, x):
 
 
 @implicit.is_stiff.implements(ring.Ring)
-def _is_stiff(scene, mode, y, linear):
+def _is_stiff_on_ring(scene, mode, y, linear):
+    """Implement :func:`implicit.is_stiff`: friction relaxes faster than the body swings and turns."""
     frequency = sqrt(scene.body.gravity / scene.body.radius) + abs(y[1]) / scene.body.radius
     return relaxes(scene, linear, frequency)
 
 
 @implicit.error_scales.implements(ring.Ring)
-def _error_scales(scene, tolerance, x):
+def _error_scales_on_ring(scene, tolerance, x):
+    """Implement :func:`implicit.error_scales`: 1 rad, and the width of the stiction band."""
     return tolerance, tolerance * stiction_band(scene.law) * ring.reaction_determinant(scene.body), inf
 
 
 @implicit.guards_and_motion.implements(ring.Ring, ring.BristleRing)
-def _guards_and_motion(scene, mode, common, forcing, x):
+def _guards_and_motion_on_ring(scene, mode, common, forcing, x):
+    """Implement :func:`implicit.guards_and_motion`.
+
+    The motion is phi, omega, the angular acceleration, the angular velocity of the ring, and deflections of bristles.
+    """
     now = slip(scene, mode, common, forcing, x)
     epsilon, determinant = ring.acceleration(scene.body, *now.K, now.motion)
     normal_1, normal_2 = ring.reactions(scene.body, *now.K, now.motion)
@@ -95,7 +103,8 @@ def _guards_and_motion(scene, mode, common, forcing, x):
 
 
 @implicit.near_zero.implements(ring.Ring, ring.BristleRing)
-def _near_zero(scene, motion):
+def _near_zero_on_ring(scene, motion):
+    """Implement :func:`implicit.near_zero`: a fiftieth of the determinant, a twentieth of the load."""
     b = scene.body
     omega = motion[1]
     load = 0.05 * b.mass * (b.gravity + b.radius * omega * omega)
@@ -103,7 +112,8 @@ def _near_zero(scene, motion):
 
 
 @implicit.seen.implements(ring.Ring, ring.BristleRing)
-def _seen(scene, view):
+def _seen_in_implicit_step_on_ring(scene, view):
+    """Implement :func:`implicit.seen`: what ``_observe_on_ring`` in :mod:`record` takes."""
     guards, motion = view
     phi, omega, epsilon = motion[:3]
     size = scene.body.gravity / scene.body.radius + omega * omega + abs(epsilon)
@@ -111,6 +121,7 @@ def _seen(scene, view):
 
 
 @implicit.sought.implements(ring.Ring, ring.BristleRing)
-def _sought(scene, record, view):
+def _sought_on_ring(scene, record, view):
+    """Implement :func:`implicit.sought`: phi, omega, both reactions."""
     guards, motion = view
     return sought(record, motion[0], motion[1], guards[NORMAL_1], guards[NORMAL_2])

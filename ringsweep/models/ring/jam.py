@@ -38,7 +38,8 @@ def balance(scene, mode, t, y, v):
 
 
 @balance.implements(Ring, BristleRing)
-def _balance(scene, mode, t, y, v):
+def _balance_on_ring(scene, mode, t, y, v):
+    """Implement :func:`balance`; there is no pivot, so the third number is 0."""
     body, (K, motion) = scene.body, friction_and_motion(scene, mode, t, (y[0], v, *y[2:]))
     epsilon, determinant = ring.acceleration(body, *K, motion)
     normal_1, normal_2 = ring.reactions(body, *K, motion)
@@ -75,7 +76,8 @@ def limit(scene, mode, t, y):
 
 
 @modes.limit_of_jam.implements(Ring, BristleRing)
-def _limit_of_jam(scene, mode, t, y):
+def _limit_of_jam_on_ring(scene, mode, t, y):
+    """Implement :func:`modes.limit_of_jam`; a body that sticks is already there."""
     if mode.sign == 0:
         return 0.0, y, (0.0, 0.0)
     s, change, _, normals = limit(scene, mode, t, y)
@@ -83,7 +85,8 @@ def _limit_of_jam(scene, mode, t, y):
 
 
 @recorder.at_jam.implements(Ring, BristleRing)
-def _at_jam(scene, record, normals, velocity):
+def _at_jam_on_ring(scene, record, normals, velocity):
+    """Implement :func:`recorder.at_jam`: extremes of the angular velocity, and greatest reactions."""
     return with_peaks(
         record,
         min(record.omega_min, velocity),

@@ -141,5 +141,6 @@ def followed(long_run, outcome, scene, status):
 
 
 @variation.due.implements(Ring, BristleRing)
-def _due(scene, record):
+def _due_on_ring(scene, record):
+    """Implement :func:`variation.due`: the end of the cycle of the drive."""
     return due(record.long_run)

@@ -199,36 +199,46 @@ with_long_run, _with_shocks = replacing("long_run"), replacing("shocks")
 
 
 @recorder.begin.implements(Ring, BristleRing)
-def _begin(scene, t, seen):
+def _begin_record_on_ring(scene, t, seen):
+    """Implement :func:`recorder.begin`; the record of a long run stays empty unless the scene asks for one."""
     begun = begin(seen, scene.epsilon_omega)
     return with_long_run(begun, long_run.launched(scene.long_run, scene, t, seen))
 
 
 @recorder.lend.implements(Ring, BristleRing)
-def _lend(scene, record, row):
+def _lend_on_ring(scene, record, row):
+    """Implement :func:`recorder.lend`: points of the section are stored in the row of the run."""
     return with_long_run(record, long_run.with_room(record.long_run, scene, row))
 
 
 @recorder.observe.implements(Ring, BristleRing)
-def _observe(scene, record, t, duration, stuck, seen):
+def _observe_on_ring(scene, record, t, duration, stuck, seen):
+    """Implement :func:`recorder.observe`.
+
+    `seen` is phi (rad), omega (rad/s), both reactions (N), ``shock.Located`` or an empty tuple, and the deflections of
+    bristles (m) if there are any.
+    """
     shocks = shock.without_event(record.shocks, seen[4])
     r = observe(record, shocks, select(stuck, duration, 0.0), seen, scene.epsilon_omega)
     return with_long_run(r, long_run.continued(r.long_run, scene, r.stick_time, t, duration, seen))
 
 
 @recorder.enter.implements(Ring, BristleRing)
-def _enter(scene, record, t, seen):
+def _enter_record_on_ring(scene, record, t, seen):
+    """Implement :func:`recorder.enter`: an instant without duration, at which the acceleration may have jumped."""
     return observe(record, shock.enter(record.shocks, t, seen[4]), 0.0, seen, scene.epsilon_omega)
 
 
 @recorder.after_event.implements(Ring)
-def _after_event(scene, record, before, mode, t):
+def _after_event_on_ring(scene, record, before, mode, t):
+    """Implement :func:`recorder.after_event`: under a smooth law nothing jumps, except at the edge of a zone."""
     if before.place_1 != mode.place_1 or before.place_2 != mode.place_2:
         return record
     return _with_shocks(record, shock.without_jump(family(scene.law), record.shocks))
 
 
 @recorder.conclude.implements(Ring, BristleRing)
-def _conclude(scene, record, status, t, place, velocity):
+def _conclude_on_ring(scene, record, status, t, place, velocity):
+    """Implement :func:`recorder.conclude`: the numbers of :class:`Outcome`, and those of a long run if there is one."""
     outcome = conclude(record, status, t, place, velocity)
     return long_run.followed(record.long_run, outcome, scene, status)

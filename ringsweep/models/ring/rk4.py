@@ -13,45 +13,53 @@ from ringsweep.physics.ring import BristleRing, Ring, coefficients_at
 
 
 @constant_step.initial_state.implements(Ring)
-def _initial_state(scene):
+def _initial_state_on_ring(scene):
+    """Implement :func:`constant_step.initial_state`: ``(phi, omega)``, rad and rad/s."""
     return scene.initial_phi, scene.initial_omega
 
 
 @slip_in_space.implements(Ring)
-def _slip_in_space(scene, y, v, forcing, angle):
+def _slip_in_space_on_ring(scene, y, v, forcing, angle):
+    """Implement :func:`slip_in_space`; nothing is added to the slip."""
     mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), coefficients_at(scene, y[0] - forcing[0]))
     friction, slopes = (opposing(mu_1, v), opposing(mu_2, v)), (-slope_1, -slope_2)
     return Slip((*angle, y[1]), y[1] - forcing[1], friction, slopes, 0.0, ()), ()
 
 
 @constant_step.rates.implements(Ring, BristleRing)
-def _rates(scene, now, y, forcing):
+def _rates_in_constant_step_on_ring(scene, now, y, forcing):
+    """Implement :func:`constant_step.rates`; sine and cosine start from those at the beginning of the step."""
     return rates(scene, y, forcing, sine_cosine_carried(y[0], now.place, now.motion[0], now.motion[1], False))
 
 
 @constant_step.inspect.implements(Ring, BristleRing)
-def _inspect(scene, y, forcing):
+def _inspect_on_ring(scene, y, forcing):
+    """Implement :func:`constant_step.inspect`."""
     return inspection(scene, y, y[0], forcing, sine_cosine(y[0]))
 
 
 @constant_step.inspect_next.implements(Ring, BristleRing)
-def _inspect_next(scene, before, y, forcing, afresh):
+def _inspect_next_on_ring(scene, before, y, forcing, afresh):
+    """Implement :func:`constant_step.inspect_next`; sine and cosine start from those of `before`."""
     carried = sine_cosine_carried(y[0], before.place, before.motion[0], before.motion[1], afresh)
     return inspection(scene, y, y[0], forcing, carried)
 
 
 @constant_step.arc_share.implements(Ring, BristleRing)
-def _arc_share(scene, now, h):
+def _arc_share_on_ring(scene, now, h):
+    """Implement :func:`constant_step.arc_share`."""
     return abs(now.v) * (h / (scene.body.radius * zones.narrowest(scene.surface)))
 
 
 @constant_step.seen.implements(Ring, BristleRing)
-def _seen(scene, y, now):
+def _seen_in_constant_step_on_ring(scene, y, now):
+    """Implement :func:`constant_step.seen`: what ``_observe_on_ring`` in :mod:`record` takes."""
     return y[0], y[1], now.normal_1, now.normal_2, ()
 
 
 @constant_step.row.implements(Ring, BristleRing)
-def _row(scene, y, forcing):
+def _row_of_constant_step_on_ring(scene, y, forcing):
+    """Implement :func:`constant_step.row`: the same columns as :func:`modes.row` on the ring."""
     now = constant_step.inspect(scene, y, forcing)
     normals, places = (now.normal_1, now.normal_2), zones_of(scene, *places_at(scene, y[0] - forcing[0]))
     row = y[0], y[1], now.rates[1], *normals, forcing[1], *places, word_of_mode(scene, now)

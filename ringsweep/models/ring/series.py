@@ -131,7 +131,8 @@ with_contacts = replacing("contacts")
 
 
 @modes.begin.implements(ring.Ring)
-def _begin(scene):
+def _begin_on_ring(scene):
+    """Implement :func:`modes.begin`; the state is ``(phi, v)``."""
     t, phi, launch = drives.beginning(scene.drive), scene.initial_phi, ring.launch_velocity(scene)
     v = drives.velocity_at_beginning(scene.drive, launch) * scene.body.radius
     status, mode, v = mode_at(scene, Instant(t, 0.0), phi, v)
@@ -153,7 +154,8 @@ def leaves_behind(scene, t, v):
 
 
 @series.table_shape.implements(ring.Ring, ring.BristleRing)
-def _table_shape(scene):
+def _table_shape_on_ring(scene):
+    """Implement :func:`series.table_shape`."""
     return FAST + 1, DETERMINANT
 
 
@@ -238,7 +240,8 @@ def friction_and_motion(scene, mode, t, y):
 
 
 @friction_and_motion.implements(ring.Ring)
-def _friction_and_motion(scene, mode, t, y):
+def _friction_and_motion_on_ring(scene, mode, t, y):
+    """Implement :func:`friction_and_motion`."""
     omega = ring.angular_velocity(scene.body, y[1], drives.turn(scene.drive, t)[1])
     return friction_under(scene, mode, abs(y[1])), (sin(y[0]), cos(y[0]), omega)
 
@@ -298,11 +301,12 @@ def lost_in_slip(scene, mode, first, t, y):
     # Near a jam the series of a reaction is inaccurate, and may vanish where the reaction does not.
     if (normal_1 if first else normal_2) > 1e-2 * scale:
         return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(scene.body) else JAM
-    return _lost(scene.body, (normal_1, normal_2), scale, first)
+    return _separated(scene.body, (normal_1, normal_2), scale, first)
 
 
 @inlined
-def _lost(body, normals, scale, first):
+def _separated(body, normals, scale, first):
+    """Status after contact 1 (`first`) or 2 is lost, or both if the other reaction is nearly zero; `scale` in N."""
     least = _AT_ONCE * scale
     return ENDS[contact.lost(body, first or normals[0] <= least, not first or normals[1] <= least)]
 
@@ -315,7 +319,7 @@ def _after_zero_reaction(scene, mode, first, t, y):
     # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band still
     # hold the body at this instant.
     normals, scale = _loads_as_stick_ends(scene, mode, t, y, first)
-    return _lost(scene.body, normals, scale, first)
+    return _separated(scene.body, normals, scale, first)
 
 
 @inlined
@@ -330,7 +334,8 @@ def _loads_as_stick_ends(scene, mode, t, y, first):
 
 
 @modes.status_when_stalled.implements(ring.Ring)
-def _status_when_stalled(scene, mode, t, y):
+def _status_when_stalled_on_ring(scene, mode, t, y):
+    """Implement :func:`modes.status_when_stalled`: steps also shrink as the body nears a jam."""
     if mode.sign == 0:
         return BROKEN
     # Where friction changes fast with the speed, the determinant does not show the jam: test with static coefficients.
@@ -340,7 +345,12 @@ def _status_when_stalled(scene, mode, t, y):
 
 
 @modes.switch.implements(ring.Ring)
-def _switch(scene, mode, guard, t, y):
+def _switch_on_ring(scene, mode, guard, t, y):
+    """Implement :func:`modes.switch`.
+
+    In slip SLOW and FAST are the bounds of the region of the law, EDGE is the edge of a zone. In stick SLOW begins
+    forward slip and FAST backward slip; at EDGE no friction holds the body.
+    """
     phi, v = y
     if guard in (NORMAL_1, NORMAL_2):
         return _after_zero_reaction(scene, mode, guard == NORMAL_1, t, y), mode, y
@@ -352,7 +362,7 @@ def _switch(scene, mode, guard, t, y):
         if guard == EDGE and contact.folds(scene.body, mu_s1, mu_s2):
             (normal_1, normal_2), scale = _loads_as_stick_ends(scene, mode, t, y, True)
             if min(normal_1, normal_2) <= _LEAST_AT_FOLD * scale:
-                return _lost(scene.body, (normal_1, normal_2), scale, normal_1 <= normal_2), mode, y
+                return _separated(scene.body, (normal_1, normal_2), scale, normal_1 <= normal_2), mode, y
         stick_end = 1 if guard == SLOW else -1 if guard == FAST else 2
     else:
         if guard == EDGE:
@@ -386,7 +396,8 @@ def slip_after(law, mode, guard, v, mu_s):
 
 
 @series.expand.implements(ring.Ring)
-def _expand(scene, mode, t, y, tolerance, c):
+def _expand_on_ring(scene, mode, t, y, tolerance, c):
+    """Implement :func:`series.expand`: fill all rows of the table, in stick or in slip."""
     drives.expand_at(scene.drive, t, ORDER + 2, c[THETA], c[FACTORS:])
     c[PHI, 0] = y[0]
     c[V, 0] = y[1]
@@ -490,6 +501,7 @@ def _expand_slip_of_constant_friction(law, scene, mode, c):
 
 
 def _slip_under(law):
+    """Function that expands slip under a law: friction that varies with the speed needs series of its own."""
     return _expand_slip_of_varying_friction if is_varying(law) else _expand_slip_of_constant_friction
 
 
@@ -584,12 +596,14 @@ def _expand_stick(scene, mode, tolerance, c):
 
 
 @series.seen_at_start.implements(ring.Ring)
-def _seen_at_start(scene, c):
-    return c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0], _acceleration(scene, c, c[EPSILON, 0])
+def _seen_at_start_on_ring(scene, c):
+    """Implement :func:`series.seen_at_start`: what ``_observe_on_ring`` in :mod:`record` takes."""
+    return c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0], _located(scene, c, c[EPSILON, 0])
 
 
 @series.seen_at.implements(ring.Ring)
-def _seen_at(scene, mode, c, s, h):
+def _seen_at_on_ring(scene, mode, c, s, h):
+    """Implement :func:`series.seen_at`: what ``_observe_on_ring`` in :mod:`record` takes."""
     phi, omega, epsilon = value(c[PHI], s), value(c[OMEGA], s), value(c[EPSILON], s)
     normal_1, normal_2 = value(c[NORMAL_1], s), value(c[NORMAL_2], s)
     if s == h and mode.sign != 0:
@@ -597,16 +611,18 @@ def _seen_at(scene, mode, c, s, h):
         motion = value(c[SIN], s), value(c[COS], s), omega
         epsilon, _ = ring.acceleration(scene.body, K1, K2, motion)
         normal_1, normal_2 = ring.reactions(scene.body, K1, K2, motion)
-    return phi, omega, normal_1, normal_2, _acceleration(scene, c, epsilon)
+    return phi, omega, normal_1, normal_2, _located(scene, c, epsilon)
 
 
 @inlined
-def _acceleration(scene, c, epsilon):
+def _located(scene, c, epsilon):
+    """Angular acceleration `epsilon` and the size of its terms, rad/s^2, for the recorder."""
     return Located(epsilon, scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(epsilon))
 
 
 @series.extremes.implements(ring.Ring)
-def _extremes(scene, record, mode, c, h, work):
+def _extremes_on_ring(scene, record, mode, c, h, work):
+    """Implement :func:`series.extremes`: of phi, omega and both reactions; and the ends of cycles."""
     count, (slowest, fastest) = 0, bounds_within(c[OMEGA], h)
     may_reverse = slowest <= 0.0 <= fastest
     # Look for an extreme only if it could exceed the recorded ones, or if omega may change sign within the step.
@@ -633,7 +649,8 @@ def _extremes(scene, record, mode, c, h, work):
 
 
 @modes.row.implements(ring.Ring, ring.BristleRing)
-def _row(scene, mode, forcing, y, seen):
+def _row_on_ring(scene, mode, forcing, y, seen):
+    """Implement :func:`modes.row`: the columns of ``RingModel.history``, then the deflections of bristles."""
     phi, omega, normal_1, normal_2, located = seen[:5]
     places, state = zones_of(scene, mode.place_1, mode.place_2), 0.0 if mode.region < 0 else float(mode.sign)
     return phi, omega, located.acceleration, normal_1, normal_2, forcing[1], *places, state, *y[2:]

@@ -26,19 +26,22 @@ def _with(record, new):
 
 
 @variation.enter.implements(Ring)
-def _enter(scene, record, mode, rates):
+def _enter_tangent_on_ring(scene, record, mode, rates):
+    """Implement :func:`variation.enter`; stick keeps no disturbance of the sliding velocity."""
     # A body that comes to rest on the ring keeps no disturbance of the sliding velocity.
     keeps = 0.0 if mode.sign == 0 and stiction_band(scene.law) == 0.0 else 1.0
     return _with(record, tangent.enter(record.long_run.tangent, keeps, rates))
 
 
 @variation.advance.implements(Ring)
-def _advance(scene, record, h, rates, weights, work):
+def _advance_tangent_on_ring(scene, record, h, rates, weights, work):
+    """Implement :func:`variation.advance`."""
     return _with(record, tangent.advance(record.long_run.tangent, h, rates, weights, work))
 
 
 @variation.switched.implements(Ring)
-def _switched(scene, record, mode, guard, t, y):
+def _switch_tangent_on_ring(scene, record, mode, guard, t, y):
+    """Implement :func:`variation.switched`."""
     before = record.long_run.tangent
     return _with(record, tangent.switched(before, _gradient(scene, mode, guard, t, y, before.rates)))
 
