@@ -229,13 +229,14 @@ def none_yet(excited, first, start):
     `excited` is an empty tuple if nothing excites the motion.
     """
     corner, unknown = Corner(0.0, start), (nan, nan, nan, nan)
-    laps, parts = Laps(0.0, 0.0, 0.0, RETURN, inf, inf, corner, corner), _none_yet(excited, start)
+    laps, parts = Laps(0.0, 0.0, 0.0, RETURN, inf, inf, corner, corner), _no_parts(excited, start)
     x, t = start.x, start.t
     return Cycles(0.0, first, x, x, t, x, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, laps, parts, *unknown)
 
 
 @feature("()")
-def _none_yet(excited, start):
+def _no_parts(excited, start):
+    """Parts of a record in which no cycle has ended; `start` is the :class:`Mark` at its beginning."""
     part = Part(0.0, start, 0.0, 0.0, 0.0)
     return Parts(0.0, 0.0, part, part, part)
 

@@ -90,6 +90,7 @@ def slip_in_space(scene, y, v, forcing, angle):
 
 @absorbed
 def _sliding_velocity(scene, y, forcing):
+    """Sliding velocity, m/s, of a state in space."""
     return (y[1] - forcing[1]) * ring.radius(scene.body)
 
 
@@ -138,7 +139,8 @@ def _creep(count, bristles, by_z, slope):
 
 
 @constant_step.holds.implements(Ring, BristleRing, Belt, BristleBelt)
-def _holds(scene, now):
+def _holds_in_slip(scene, now):
+    """Implement :func:`constant_step.holds`: finite, not jammed, and no contact pulls."""
     # Comparisons with NaN are false.
     finite = (abs(now.rates[1]) < inf) & (abs(now.rates[0]) < inf)
     supported = (now.determinant > 0.0) & (now.normal_1 > 0.0) & (now.normal_2 > 0.0)
@@ -146,7 +148,8 @@ def _holds(scene, now):
 
 
 @constant_step.verdict.implements(Ring, BristleRing, Belt, BristleBelt)
-def _verdict(scene, before, now):
+def _verdict_in_slip(scene, before, now):
+    """Implement :func:`constant_step.verdict`: jammed, separated where a reaction vanishes, or running."""
     if not now.determinant > 0.0:
         return (BROKEN if isnan(now.determinant) else JAM), 1.0
     if not (isfinite(now.rates[1]) and isfinite(now.rates[0])):
@@ -169,7 +172,8 @@ def _root_fraction(before, now):
 
 
 @constant_step.eigenvalue.implements(Ring, Belt)
-def _eigenvalue(scene, before, now, h, most):
+def _eigenvalue_without_bristles(scene, before, now, h, most):
+    """Implement :func:`constant_step.eigenvalue`; the slope of friction in a band that a step jumps over counts."""
     radius = ring.radius(scene.body)
     friction_slope = _steeper(before.slope, now.slope)
     # A step that jumps over the band, or over its edge, does not sample the slope there. The slope counts all the same,
@@ -200,27 +204,31 @@ def _steeper(a, b):
 
 
 @constant_step.margin.implements(Ring, BristleRing, Belt, BristleBelt)
-def _margin(scene, before, now):
+def _margin_in_slip(scene, before, now):
+    """Implement :func:`constant_step.margin`: lower bound on both reactions within the step, N."""
     first = min(before.normal_1, now.normal_1) - 0.25 * abs(now.normal_1 - before.normal_1)
     second = min(before.normal_2, now.normal_2) - 0.25 * abs(now.normal_2 - before.normal_2)
     return ring.if_load_varies(scene.body, min(first, second), inf)
 
 
 @constant_step.fall_rate.implements(Ring, BristleRing, Belt, BristleBelt)
-def _fall_rate(scene, before, now, h):
+def _fall_rate_in_slip(scene, before, now, h):
+    """Implement :func:`constant_step.fall_rate`: of the reaction that vanished, N/s."""
     first = before.normal_1 - now.normal_1 if now.normal_1 <= 0.0 else 0.0
     second = before.normal_2 - now.normal_2 if now.normal_2 <= 0.0 else 0.0
     return max(first, second) / h
 
 
 @constant_step.sticks.implements(Ring, Belt)
-def _sticks(scene, before, now):
+def _sticks_without_bristles(scene, before, now):
+    """Implement :func:`constant_step.sticks`: the step lies in the stiction band or jumps over it."""
     # The step lies in the stiction band or jumps over it.
     return (abs(before.v) < stiction_band(scene.law)) | (before.v * now.v < 0.0)
 
 
 @constant_step.eigenvalue.implements(BristleRing, BristleBelt)
 def _eigenvalue_with_bristles(scene, before, now, h, most):
+    """Implement :func:`constant_step.eigenvalue`; the first step counts at its beginning too."""
     if any_of(most == 0.0):
         most = _larger_eigenvalue_at(before, most)
     return _larger_eigenvalue_at(now, most)
@@ -228,12 +236,14 @@ def _eigenvalue_with_bristles(scene, before, now, h, most):
 
 @absorbed
 def _larger_eigenvalue_at(now, most):
+    """Largest magnitude of an eigenvalue up to now, 1/s: `most`, or that of an :class:`Inspection` on bristles."""
     # The body swings even where friction is small.
     return larger_eigenvalue(larger_eigenvalue(most, *now.creep), now.by_velocity, -now.by_place)
 
 
 @constant_step.sticks.implements(BristleRing, BristleBelt)
 def _sticks_on_bristles(scene, before, now):
+    """Implement :func:`constant_step.sticks`."""
     return before.stuck > 0.0
 
 
@@ -243,10 +253,12 @@ def word_of_mode(scene, now):
 
 
 @word_of_mode.implements(Ring, Belt)
-def _by_velocity(scene, now):
+def _word_of_mode_by_velocity(scene, now):
+    """Implement :func:`word_of_mode`: stick is the stiction band."""
     return 0.0 if abs(now.v) < stiction_band(scene.law) or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
 
 
 @word_of_mode.implements(BristleRing, BristleBelt)
-def _by_bristles(scene, now):
+def _word_of_mode_by_bristles(scene, now):
+    """Implement :func:`word_of_mode`: stick is the guard of the bristles."""
     return 0.0 if now.stuck > 0.0 else 1.0 if now.v > 0.0 else -1.0

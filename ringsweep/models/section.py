@@ -143,6 +143,7 @@ def with_point(asked, scene, r, cycles_now, now, deflections, least_rise):
 
 @inlined
 def _with_turn(asked, r, now, deflections, least_rise):
+    """Points after an observation; a turn is a greatest displacement after a rise of more than `least_rise`, m."""
     p = r.section
     count, pending, x_turn, deflections_turn = p.number, p.pending, p.x_turn, p.deflections_turn
     low = min(p.low, r.last.x)
@@ -199,5 +200,6 @@ def put_in_order(asked, section):
 
 @inlined
 def _reverse(row, start, stop):
+    """Reverse the order of the numbers ``row[start:stop]``."""
     for k in range((stop - start) // 2):
         row[start + k], row[stop - 1 - k] = row[stop - 1 - k], row[start + k]

@@ -38,28 +38,33 @@ _UNBALANCED = 1e-9 * 1e-9
 
 
 @series.state_at.implements(Ring, Belt)
-def _state_at(scene, c, s):
+def _state_at_without_bristles(scene, c, s):
+    """Implement :func:`series.state_at`."""
     return value(c[0], s), value(c[1], s)
 
 
 @series.rates_at.implements(Ring, Belt)
-def _rates_at(scene, c, s):
+def _rates_at_without_bristles(scene, c, s):
+    """Implement :func:`series.rates_at`."""
     return slope(c[0], s), slope(c[1], s)
 
 
 @modes.in_space.implements(Ring, BristleBelt)
-def _in_space(scene, t, y):
+def _in_space_by_drive(scene, t, y):
+    """Implement :func:`modes.in_space`: the velocity in space is that of the drive plus the sliding velocity."""
     return y[0], y[1] / ring.radius(scene.body) + drives.turn(scene.drive, t)[1]
 
 
 # The place of an implicit step is relative to the drive, so that no large numbers cancel in slow creep.
 @implicit.to_implicit.implements(Ring, Belt, BristleBelt)
-def _to_implicit(scene, forcing, y):
+def _place_from_drive(scene, forcing, y):
+    """Implement :func:`implicit.to_implicit`."""
     return y[0] - forcing[0], *y[1:]
 
 
 @implicit.from_implicit.implements(Ring, Belt, BristleBelt)
-def _from_implicit(scene, forcing, x):
+def _place_from_space(scene, forcing, x):
+    """Implement :func:`implicit.from_implicit`."""
     return x[0] + forcing[0], *x[1:]
 
 
@@ -161,7 +166,8 @@ def audited(scene, mode, forcing, y):
 
 
 @audit.violation.implements(BristleRing, BristleBelt)
-def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
+def _violation_on_bristles(scene, mode, forcing, y, rates, s, tolerance):
+    """Implement :func:`audit.violation` for laws with bristles; the rate of each deflection is checked too."""
     now, terms, largest = audited(scene, mode, forcing, y)
     body, v = scene.body, y[1]
     if not ring.acceleration(body, *now.K, now.motion)[1] > 0.0:

@@ -111,7 +111,8 @@ def deflection_rates(count, bristles):
 
 
 @unrolled
-def _none(count, bristles):
+def _zeros(count, bristles):
+    """As many zeros as there are bundles of bristles."""
     return [f"return ({'0.0, ' * count})"]
 
 
@@ -134,7 +135,8 @@ def _rows_of_deflections(count, bristles):
 
 
 @implicit.rates.implements(Ring, BristleRing, Belt, BristleBelt)
-def _rates(scene, mode, common, forcing, x):
+def _rates_in_slip(scene, mode, common, forcing, x):
+    """Implement :func:`implicit.rates`: of the place, of the sliding velocity, and of the deflections."""
     now = slip(scene, mode, common, forcing, x)
     acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
     sliding = ring.radius(scene.body) * (acceleration - forcing[2])
@@ -142,13 +144,14 @@ def _rates(scene, mode, common, forcing, x):
 
 
 @implicit.linearise.implements(Ring, BristleRing, Belt, BristleBelt)
-def _linearise(scene, mode, common, t, forcing, x):
+def _linearise_slip(scene, mode, common, t, forcing, x):
+    """Implement :func:`implicit.linearise`."""
     now, radius = slip(scene, mode, common, forcing, x), ring.radius(scene.body)
     acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
     by_place, by_v, by_drive = acceleration_slopes(scene, now)
     by_force = force_rate(scene.drive, forcing) / scene.body.mass
     by_time = by_place * forcing[1] + by_drive * forcing[2] + by_force - radius * drives.jerk_at(scene.drive, t)
-    nothing = _none(now.bristles)
+    nothing = _zeros(now.bristles)
     first = joined((0.0, 1.0 / radius), nothing)
     second = joined((by_place, by_v), by_deflections(now.bristles, scene, now))
     return (
@@ -170,14 +173,16 @@ def relaxes(scene, linear, frequency):
 
 
 @region_guards.implements(Ring, Belt)
-def _bounds_of_speed(scene, mode, common, x):
+def _region_guards_by_speed(scene, mode, common, x):
+    """Implement :func:`region_guards`: distances of the speed from both bounds, m/s."""
     low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
     return speed - low, high - speed
 
 
 @variation.jacobian.implements(Ring, Belt)
-def _jacobian(scene, mode, t, y):
+def _jacobian_without_bristles(scene, mode, t, y):
+    """Implement :func:`variation.jacobian`; in a dead band the place does not follow the velocity."""
     has_dead_band = holds_in_band(scene.law) and stiction_band(scene.law) > 0.0
     in_dead_band = has_dead_band and (mode.sign == 0 or mode.region < 0)
     per_radius = 0.0 if in_dead_band else 1.0 / ring.radius(scene.body)
@@ -191,6 +196,7 @@ def _jacobian(scene, mode, t, y):
 
 @variation.jacobian.implements(BristleBelt)
 def _jacobian_with_bristles(scene, mode, t, y):
+    """Implement :func:`variation.jacobian`."""
     now = slip_at(scene, mode, t, y)
     by_place, by_v, _ = acceleration_slopes(scene, now)
     (by_z,), (bundle,) = by_deflections(now.bristles, scene, now), now.bristles

@@ -150,6 +150,7 @@ def _unit(length, vector):
 
 @unrolled
 def _scaled(length, vector, factor):
+    """Vector times a number."""
     return ["return " + ", ".join(f"factor * vector[{i}]" for i in range(length))]
 
 
@@ -182,11 +183,12 @@ def logarithm(x):
 @unrolled
 def _eigenvalues(length, vector, matrix, log_determinant):
     """Magnitudes of the two largest eigenvalues, their logarithms, and their arguments."""
-    return [f"return {'_of_two_by_two' if length == 2 else '_of_three_by_three'}(matrix, log_determinant)"]
+    return [f"return {'_eigenvalues_of_two' if length == 2 else '_eigenvalues_of_three'}(matrix, log_determinant)"]
 
 
 @inlined
-def _of_two_by_two(matrix, log_determinant):
+def _eigenvalues_of_two(matrix, log_determinant):
+    """Eigenvalues of a 2 by 2 matrix, see :func:`eigenvalues`."""
     # No mode of a motion turns the plane of its states over: real eigenvalues have one sign.
     a, b, c, d = matrix
     half, root = 0.5 * (a + d), 0.25 * (a - d) ** 2 + b * c
@@ -207,7 +209,8 @@ def _angle(x):
 
 
 @inlined
-def _of_three_by_three(matrix, log_determinant):
+def _eigenvalues_of_three(matrix, log_determinant):
+    """Eigenvalues of a 3 by 3 matrix: the two of largest magnitude, see :func:`eigenvalues`."""
     a, b, c, d, e, f, g, h, i = matrix
     minors = a * e - b * d + a * i - c * g + e * i - f * h
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
@@ -283,6 +286,7 @@ def switched(tangent, gradient):
 
 @unrolled
 def _is_pending(length, gradient):
+    """Whether an event awaits its saltation: the gradient of its guard is not zero."""
     return ["return " + " or ".join(f"gradient[{i}] != 0.0" for i in range(length))]
 
 
