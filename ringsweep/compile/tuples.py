@@ -142,6 +142,7 @@ def take(batch: Any, i: Any) -> Any:
 
 
 def _take_one(batch: Any, i: Any) -> Any:
+    """Body of :func:`take` for the type of a batch: a cell of each array."""
     if isinstance(batch, CellsType):
         return lambda batch, i: cell_at(batch, i)
     if isinstance(batch, types.Array):

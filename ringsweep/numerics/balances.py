@@ -27,19 +27,19 @@ class Polynomial(dict[Monomial, float]):
                 del self[monomial]
 
     def __add__(self, other: Any) -> Polynomial:
-        return Polynomial([*self.items(), *_polynomial(other).items()])
+        return Polynomial([*self.items(), *_as_polynomial(other).items()])
 
     def __neg__(self) -> Polynomial:
         return self * -1.0
 
     def __sub__(self, other: Any) -> Polynomial:
-        return self + _polynomial(other) * -1.0
+        return self + _as_polynomial(other) * -1.0
 
     def __rsub__(self, other: Any) -> Polynomial:
         return other + -self
 
     def __mul__(self, other: Any) -> Polynomial:
-        pairs = ((a, p, b, q) for a, p in self.items() for b, q in _polynomial(other).items())
+        pairs = ((a, p, b, q) for a, p in self.items() for b, q in _as_polynomial(other).items())
         return Polynomial((_product(a, b), p * q) for a, p, b, q in pairs)
 
     def __pow__(self, power: int) -> Polynomial:
@@ -52,7 +52,7 @@ class Polynomial(dict[Monomial, float]):
         found = Polynomial()
         for monomial, term in self.parts(values).items():
             for name, power in monomial:
-                term *= _polynomial(values[name]) ** power
+                term *= _as_polynomial(values[name]) ** power
             found += term
         return found
 
@@ -85,18 +85,20 @@ class Polynomial(dict[Monomial, float]):
         return {name for monomial in self for name, _ in monomial}
 
 
-def _polynomial(value: Any) -> Polynomial:
+def _as_polynomial(value: Any) -> Polynomial:
+    """A number as a polynomial; a polynomial itself."""
     return value if isinstance(value, Polynomial) else Polynomial([((), float(value))])
 
 
 def _product(a: Monomial, b: Monomial) -> Monomial:
+    """Product of two monomials: the powers are added."""
     powers = dict(a)
     for name, power in b:
         powers[name] = powers.get(name, 0) + power
     return tuple(sorted((name, power) for name, power in powers.items() if power))
 
 
-ONE = _polynomial(1.0)
+ONE = _as_polynomial(1.0)
 
 
 def symbol(name: str) -> Polynomial:
@@ -116,7 +118,7 @@ def read(text: str, names: Iterable[str]) -> Polynomial:
     symbols = {name: symbol(name) for name in names}
     try:
         # Texts are part of Python files.
-        return _polynomial(eval(f"({right}) - ({left or 0})", {"__builtins__": {}}, symbols))
+        return _as_polynomial(eval(f"({right}) - ({left or 0})", {"__builtins__": {}}, symbols))
     except NameError as error:
         near = get_close_matches(str(error.name), symbols, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
@@ -206,7 +208,7 @@ class Source:
             row = rest.parts(self.inner)
             content = _content(row)
             key = frozenset((key, tuple(sorted(entry.over(content).items()))) for key, entry in row.items())
-            groups.setdefault(key, []).append((_text(monomial), row, content))
+            groups.setdefault(key, []).append((_text_of(monomial), row, content))
         terms = []
         for group in groups.values():
             load, row, content = group[0]
@@ -226,7 +228,7 @@ class Source:
         terms = []
         for constant, parts in groups.items():
             first = parts[0][0]
-            terms.append((first, constant, self._sum([(first * sign, "1.0", _text(key)) for sign, key in parts])))
+            terms.append((first, constant, self._sum([(first * sign, "1.0", _text_of(key)) for sign, key in parts])))
         return self._sum(terms)
 
     def _sum(self, terms: Sequence[tuple[float, str, str]]) -> str:
@@ -244,7 +246,7 @@ class Source:
         if not p.symbols:
             return sign, repr(p[()])
         if self._plain or list(p.items()) == list(symbol(min(p.symbols)).items()):
-            terms = [(factor, repr(abs(factor)), _text(monomial, "body.")) for monomial, factor in p.items()]
+            terms = [(factor, repr(abs(factor)), _text_of(monomial, "body.")) for monomial, factor in p.items()]
             return sign, self._sum(terms)
         key = tuple(sorted(p.items()))
         self.constants.setdefault(key, p)
@@ -259,7 +261,8 @@ def _content(row: Mapping[Monomial, Polynomial]) -> Polynomial:
     return Polynomial([(tuple(sorted((name, power) for name, power in common.items() if power)), first)])
 
 
-def _text(monomial: Monomial, prefix: str = "") -> str:
+def _text_of(monomial: Monomial, prefix: str = "") -> str:
+    """Source text of a monomial; `prefix` stands before each name."""
     return " * ".join(prefix + name for name, power in monomial for _ in range(power)) or "1.0"
 
 

@@ -46,6 +46,7 @@ _NODES: dict[Any, Node] = {}
 
 
 def _node(kind: str, *parts: Node, value: Any = None) -> Node:
+    """The one node of this kind with these parts."""
     key = kind, parts, value
     if key not in _NODES:
         _NODES[key] = Node(kind, parts, value)
@@ -54,6 +55,7 @@ def _node(kind: str, *parts: Node, value: Any = None) -> Node:
 
 @cache
 def _varies(node: Node) -> bool:
+    """Whether a node depends on the variable."""
     return node.kind in ("variable", "switch") or any(_varies(part) for part in node.parts)
 
 
@@ -295,11 +297,12 @@ def evaluate(a: Node, variable: Any, values: Mapping[str, Any], thresholds: Any 
     found: dict[Node, Any] = {}
     with np.errstate(all="ignore"):
         for node in nodes_of(a):
-            found[node] = _apply(node, [found[part] for part in node.parts], variable, values, thresholds)
+            found[node] = _value_of(node, [found[part] for part in node.parts], variable, values, thresholds)
     return np.asarray(found[a], dtype=np.float64)
 
 
-def _apply(node: Node, parts: list[Any], variable: Any, values: Mapping[str, Any], thresholds: Any) -> Any:
+def _value_of(node: Node, parts: list[Any], variable: Any, values: Mapping[str, Any], thresholds: Any) -> Any:
+    """Value of a node from the values of its parts, for arrays."""
     if node.kind == "number":
         return np.float64(node.value)
     if node.kind == "symbol":

@@ -27,13 +27,16 @@ from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, intrinsi
 
 
 @intrinsic
-def _select(typingctx, condition, a, b):
+def _select_lanes(typingctx, condition, a, b):
+    """Form of :func:`select` for vector lanes."""
     given = MASK if MASK in (a, b) else LANES
     return given(MASK, given, given), lambda context, builder, sig, args: builder.select(*args)
 
 
 @intrinsic
-def _any(typingctx, mask):
+def _any_lane(typingctx, mask):
+    """Whether some lane of a mask is true."""
+
     def lower(context, builder, sig, args):
         return builder.icmp_unsigned(
             "!=", builder.bitcast(args[0], ir.IntType(WIDTH)), ir.Constant(ir.IntType(WIDTH), 0)
@@ -150,7 +153,7 @@ def select(condition, a, b):
     return a if condition else b
 
 
-lanes_body(select)(lambda condition, a, b: _select(condition, a, b))
+lanes_body(select)(lambda condition, a, b: _select_lanes(condition, a, b))
 
 
 @absorbed
@@ -164,7 +167,7 @@ def any_of(condition):
     return condition
 
 
-lanes_body(any_of)(lambda condition: _any(condition))
+lanes_body(any_of)(lambda condition: _any_lane(condition))
 
 
 def floor(x):
@@ -231,7 +234,8 @@ def decay(x):
 
 
 @lanes_body(decay)
-def _lanes_decay(x):
+def _decay_in_lanes(x):
+    """Form of :func:`decay` for vector lanes."""
     shifted = _SHIFT / _PARTS - x * _PER_LN2
     n = shifted - _SHIFT / _PARTS
     r = -x - n * _LN2
@@ -253,7 +257,8 @@ def hyperbolic_tangent(x):
 
 
 @lanes_body(hyperbolic_tangent)
-def _lanes_hyperbolic_tangent(x):
+def _hyperbolic_tangent_in_lanes(x):
+    """Form of :func:`hyperbolic_tangent` for vector lanes."""
     q = decay(min(2.0 * abs(x), 80.0))
     large, square = (1.0 - q) / (1.0 + q), x * x
     # The difference would lose the digits of a small result.
@@ -265,12 +270,15 @@ _pow = llvm_function("llvm.pow")
 
 
 @intrinsic
-def _raised(typingctx, x, exponent):
+def _power_in_lanes(typingctx, x, exponent):
+    """Form of :func:`power` for vector lanes."""
     return LANES(LANES, LANES), lambda context, builder, sig, args: _pow(builder, *args)
 
 
 @intrinsic
-def _arc_tangent(typingctx, x):
+def _arc_tangent_in_lanes(typingctx, x):
+    """Form of the arc tangent for vector lanes."""
+
     def lower(context, builder, sig, args):
         # LLVM has no such function of vectors: the C library computes each lane.
         kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()])
@@ -298,7 +306,7 @@ def raised(x, exponent):
     return x**exponent
 
 
-lanes_body(raised)(lambda x, exponent: _raised(spread(x), spread(exponent)))
+lanes_body(raised)(lambda x, exponent: _power_in_lanes(spread(x), spread(exponent)))
 
 
 def arc_tangent(x):
@@ -306,11 +314,12 @@ def arc_tangent(x):
     return math.atan(x)
 
 
-lanes_body(arc_tangent)(lambda x: _arc_tangent(x))
+lanes_body(arc_tangent)(lambda x: _arc_tangent_in_lanes(x))
 
 
 @intrinsic
-def _spread(typingctx, x):
+def _spread_number(typingctx, x):
+    """Lanes that all hold the same number."""
     return LANES(types.float64), lambda context, builder, sig, args: spread_scalar(builder, args[0], VECTOR)
 
 
@@ -319,7 +328,7 @@ def spread(x):
     return x
 
 
-_spread_number: Any = _spread
+_spread_number: Any = _spread_number
 
 
 @intrinsic
@@ -351,7 +360,8 @@ def sine_cosine(x):
 
 
 @lanes_body(sine_cosine)
-def _lanes_sine_cosine(x):
+def _sine_cosine_in_lanes(x):
+    """Form of :func:`sine_cosine` for vector lanes."""
     shifted = x * _PER_HALF_PI + _SHIFT
     n = shifted - _SHIFT
     r = ((x - n * _HALF_PI_1) - n * _HALF_PI_2) - n * _HALF_PI_3
@@ -369,9 +379,9 @@ def _lanes_sine_cosine(x):
         + f * f * (2.08757232129817482790e-09 + s * -1.13596475577881948265e-11)
     )
     swap = _bit(shifted, 0)
-    a, b = _select(swap, cosine, sine), _select(swap, sine, cosine)
+    a, b = _select_lanes(swap, cosine, sine), _select_lanes(swap, sine, cosine)
     # Sine is negative in the third and fourth quadrants, cosine in the second and third.
-    return _select(_bit(shifted, 1), -a, a), _select(_bit(shifted + 1.0, 1), -b, b)
+    return _select_lanes(_bit(shifted, 1), -a, a), _select_lanes(_bit(shifted + 1.0, 1), -b, b)
 
 
 def sine_cosine_carried(x, x_0, sine, cosine, afresh):
@@ -384,7 +394,8 @@ def sine_cosine_carried(x, x_0, sine, cosine, afresh):
 
 
 @lanes_body(sine_cosine_carried)
-def _lanes_sine_cosine_carried(x, x_0, sine, cosine, afresh):
+def _sine_cosine_carried_in_lanes(x, x_0, sine, cosine, afresh):
+    """Form of :func:`sine_cosine_carried` for vector lanes."""
     r = x - x_0
     s = r * r
     sine_r = r + r * s * (-1 / 6 + s * (1 / 120 - s * (1 / 5040)))
@@ -396,7 +407,7 @@ def _lanes_sine_cosine_carried(x, x_0, sine, cosine, afresh):
     if afresh or any_of(far):
         sine, cosine = sine_cosine(x)
         far = far | afresh
-        a, b = _select(far, sine, a), _select(far, cosine, b)
+        a, b = _select_lanes(far, sine, a), _select_lanes(far, cosine, b)
     return a, b
 
 

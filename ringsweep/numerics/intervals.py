@@ -70,10 +70,12 @@ def exact(value: Any) -> Interval:
 
 
 def _outward(low: Any, high: Any, partial: Any = None) -> Interval:
+    """Interval between the next smaller and the next larger double."""
     return Interval(np.nextafter(low, -np.inf), np.nextafter(high, np.inf), partial)
 
 
 def _either(a: Any, b: Any) -> Any:
+    """Where one of two marks `partial` is set; None stands for nowhere."""
     return b if a is None else a if b is None else a | b
 
 
@@ -149,12 +151,14 @@ def _on_domain(a: Interval) -> tuple[Any, Any, Any]:
 
 
 def _sqrt(a: Interval) -> Interval:
+    """Square root of the part of an interval that is not negative."""
     low, high, partial = _on_domain(a)
     found = _outward(np.sqrt(low), np.sqrt(high), partial)
     return Interval(np.maximum(found.low, 0.0), found.high, partial)
 
 
 def _log(a: Interval) -> Interval:
+    """Logarithm of the part of an interval that is not negative."""
     low, high, partial = _on_domain(a)
     found = _monotone(np.log)(Interval(low, high, partial))
     at_zero = low == 0.0
@@ -162,6 +166,7 @@ def _log(a: Interval) -> Interval:
 
 
 def _power(a: Interval, exponent: Interval) -> Interval:
+    """Power of the part of an interval that is not negative; of all of it if the exponent is whole."""
     low, high, partial = _on_domain(a)
     corners = [np.power(x, y) for x in (low, high) for y in (exponent.low, exponent.high)]
     least, most = np.minimum.reduce(corners), np.maximum.reduce(corners)
@@ -179,6 +184,7 @@ def _power(a: Interval, exponent: Interval) -> Interval:
 
 
 def _extreme(choose: Any, a: Interval, b: Interval) -> Interval:
+    """Minimum or maximum of two intervals; `choose` is ``np.minimum`` or ``np.maximum``."""
     return Interval(choose(a.low, b.low), choose(a.high, b.high), _either(a.partial, b.partial))
 
 
@@ -198,6 +204,7 @@ def _decay(a: Interval) -> Interval:
 
 
 def _sum(terms: list[Interval | None]) -> Interval | None:
+    """Sum of intervals; None stands for zero."""
     found = None
     for term in terms:
         found = term if found is None else found if term is None else add(found, term)
@@ -205,6 +212,7 @@ def _sum(terms: list[Interval | None]) -> Interval | None:
 
 
 def _product(a: Interval | None, b: Interval | None, factor: float = 1.0) -> Interval | None:
+    """Product of two intervals and a number; None stands for zero."""
     if a is None or b is None:
         return None
     found = multiply(a, b)
@@ -212,6 +220,7 @@ def _product(a: Interval | None, b: Interval | None, factor: float = 1.0) -> Int
 
 
 def _product_series(a: Series, b: Series) -> Series:
+    """Power series of a product."""
     if a is not b:
         return [_sum([_product(a[j], b[k - j]) for j in range(k + 1)]) for k in range(len(a))]
     found = []
@@ -223,10 +232,12 @@ def _product_series(a: Series, b: Series) -> Series:
 
 
 def _minus(a: Interval | None) -> Interval | None:
+    """Negative of an interval; None stands for zero."""
     return None if a is None else Interval(-a.high, -a.low, a.partial) if a.low is not a.high else exact(-a.low)
 
 
 def _quotient_series(a: Series, b: Series) -> Series:
+    """Power series of a quotient; that of the divisor begins with a number."""
     assert b[0] is not None
     per = inverse(b[0])
     found: Series = []
@@ -237,14 +248,17 @@ def _quotient_series(a: Series, b: Series) -> Series:
 
 
 def _replaced(a: Interval | None, where: Any, value: float) -> Interval | None:
+    """Interval with another value for both bounds where the condition holds."""
     return a if a is None else Interval(np.where(where, value, a.low), np.where(where, value, a.high), a.partial)
 
 
-def _scaled(a: Interval | None, k: float) -> Interval | None:
+def _scaled_or_zero(a: Interval | None, k: float) -> Interval | None:
+    """Interval times a number; None stands for zero."""
     return a if a is None or k == 1.0 else scaled(a, k)
 
 
 def _series_of(node: Node, parts: list[Series], order: int) -> Series:
+    """Power series of a node from those of its parts, with `order` + 1 coefficients."""
     a = parts[0]
     if node.kind == "add":
         return [_sum([x, y]) for x, y in zip(*parts, strict=True)]
@@ -262,8 +276,8 @@ def _series_of(node: Node, parts: list[Series], order: int) -> Series:
         if node.kind == "tanh":
             n[0] = _decay(inner)
         assert q[0] is not None
-        rate = _sum([_product(_scaled(a[j], j), n[k - j]) for j in range(1, k + 1)])
-        rest = _sum([_product(_scaled(found[j], j), q[k - j]) for j in range(1, k)])
+        rate = _sum([_product(_scaled_or_zero(a[j], j), n[k - j]) for j in range(1, k + 1)])
+        rest = _sum([_product(_scaled_or_zero(found[j], j), q[k - j]) for j in range(1, k)])
         term = _over(_sum([rate, _minus(rest)]), k)
         found.append(term if below is ONE else _product(term, inverse(q[0])))
     if node.kind == "exp" and (overflows := inner.low > _LARGEST_EXPONENT).any():
@@ -288,6 +302,7 @@ def _among(node: Node, known: Mapping[Node, Series], order: int) -> Series:
 
 
 def _over(a: Interval | None, k: int) -> Interval | None:
+    """Interval divided by a positive whole number; None stands for zero."""
     return a if a is None or k == 1 else _outward(a.low / k, a.high / k, a.partial)
 
 
@@ -410,7 +425,7 @@ class Enclosure:
             Highest power.
         """
         found = self._found(row, low, high, side, order)[self.output]
-        return [None if c is None else _spread(c, len(row)) for c in found]
+        return [None if c is None else _for_each_cell(c, len(row)) for c in found]
 
     def _found(self, row: Any, low: Any, high: Any, side: Any, order: int) -> dict[Node, Series]:
         found: dict[Node, Series] = {}
@@ -447,6 +462,7 @@ def _horner(coefficients: list[Interval | None], speed: Interval, order: int) ->
 
 
 def _taken(a: Interval, row: NDArray[np.intp]) -> Interval:
+    """Bounds in the rows `row`; a constant without rows is the same in all."""
     if a.low.ndim == 0:
         return a
     low = a.low[row]
@@ -455,6 +471,7 @@ def _taken(a: Interval, row: NDArray[np.intp]) -> Interval:
 
 
 def _chosen(below: Any, a: Interval | None, b: Interval | None) -> Interval | None:
+    """Interval `a` where `below` is true, else `b`; None stands for zero."""
     if a is None and b is None:
         return None
     a, b = (exact(0.0) if x is None else x for x in (a, b))
@@ -464,6 +481,7 @@ def _chosen(below: Any, a: Interval | None, b: Interval | None) -> Interval | No
     return Interval(np.where(below, a.low, b.low), np.where(below, a.high, b.high), partial)
 
 
-def _spread(a: Interval, cells: int) -> Interval:
+def _for_each_cell(a: Interval, cells: int) -> Interval:
+    """Interval with bounds for each of so many cells."""
     partial = None if a.partial is None else np.broadcast_to(a.partial, cells)
     return Interval(np.broadcast_to(a.low, cells), np.broadcast_to(a.high, cells), partial)

@@ -98,6 +98,7 @@ def cells_between(low: NDArray[np.float64], high: NDArray[np.float64], breaks: l
 
 
 def _check_budget(cells: Cells, split: NDArray[np.bool_]) -> None:
+    """Raise if some row still has too many cells that are to be divided."""
     count = np.bincount(cells.row[split], minlength=1)
     if count.max() > _MOST:
         chosen = split & (cells.row == count.argmax())
@@ -125,6 +126,7 @@ def _subdivide(cells: Cells, decide: _Decide) -> tuple[Cells, NDArray[np.int8]]:
 
 
 def _joined(parts: list[Cells]) -> Cells:
+    """Cells of several tables in one."""
     row, low, high = (np.concatenate(fields) for fields in zip(*parts, strict=True))
     return Cells(row, low, high)
 
@@ -139,11 +141,13 @@ def _at(enclosure: Enclosure, cells: Cells, speed: NDArray[np.float64], k: int) 
 
 
 def _filled(found: Interval | None, cells: int) -> Interval:
+    """Interval of shape ``(cells,)``; None stands for zero."""
     zero = np.zeros(cells)
     return Interval(zero, zero) if found is None else found
 
 
 def _whole(found: Interval) -> NDArray[np.bool_]:
+    """Where an expression is defined on the whole of a cell."""
     defined = ~np.isnan(found.low)
     return defined if found.partial is None else defined & ~found.partial
 
@@ -401,6 +405,7 @@ def first_flat(
 def _running_maximum(
     values: NDArray[np.float64], at: tuple[NDArray[np.intp], NDArray[np.intp]], shape: tuple[int, int]
 ) -> NDArray[np.float64]:
+    """Greatest of these values up to each column; other columns hold minus infinity."""
     wide = np.full(shape, -np.inf)
     wide[at] = values
     found: NDArray[np.float64] = np.maximum.accumulate(wide, axis=1)

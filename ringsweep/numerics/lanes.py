@@ -29,6 +29,8 @@ VECTOR, WORDS = (ir.VectorType(kind, WIDTH) for kind in (_DOUBLE, _WORD))
 
 
 class _Vector(types.Type):
+    """Numba type of `width` numbers or truth values side by side."""
+
     element: ClassVar[Any]
 
     def __init__(self, width: int) -> None:
@@ -54,6 +56,8 @@ LANES, MASK = Lanes(WIDTH), Mask(WIDTH)
 @register_model(Lanes)
 @register_model(Mask)
 class _VectorModel(models.PrimitiveModel):
+    """Memory of a vector: an LLVM vector."""
+
     def __init__(self, dmm: Any, fe_type: Any) -> None:
         super().__init__(dmm, fe_type, ir.VectorType(fe_type.element, fe_type.width))
 
@@ -71,11 +75,13 @@ def spread_scalar(builder: Any, value: Any, kind: ir.VectorType) -> Any:
 @lower_cast(types.Float, Lanes)
 @lower_cast(types.Integer, Lanes)
 def _from_number(context, builder, fromty, toty, value):
+    """Cast a number to lanes that all hold it."""
     return spread_scalar(builder, context.cast(builder, value, fromty, types.float64), context.get_value_type(toty))
 
 
 @lower_cast(types.Boolean, Mask)
 def _from_boolean(context, builder, fromty, toty, value):
+    """Cast a truth value to a mask that holds it in all lanes."""
     bit = builder.trunc(value, ir.IntType(1)) if value.type.width > 1 else value
     return spread_scalar(builder, bit, context.get_value_type(toty))
 
@@ -142,7 +148,8 @@ _define(max, Lanes, Lanes, 2, lambda builder, a, b: builder.select(builder.fcmp_
 # ---- memory ----------------------------------------------------------------------------------
 
 
-def _place(context: Any, builder: Any, sig: Any, args: Any, lanes: Lanes) -> Any:
+def _pointer_to_lanes(context: Any, builder: Any, sig: Any, args: Any, lanes: Lanes) -> Any:
+    """Pointer to the lanes that begin at an index of an array of floats."""
     memory = context.make_array(sig.args[0])(context, builder, args[0])
     vector = ir.VectorType(_DOUBLE, lanes.width)
     return builder.bitcast(builder.gep(memory.data, [args[1]]), vector.as_pointer())
@@ -154,7 +161,7 @@ def loader(lanes: Lanes) -> Any:
     @intrinsic
     def load(typingctx, memory, at):
         def lower(context, builder, sig, args):
-            return builder.load(_place(context, builder, sig, args, lanes), align=8)
+            return builder.load(_pointer_to_lanes(context, builder, sig, args, lanes), align=8)
 
         return lanes(memory, types.intp), lower
 
@@ -167,7 +174,7 @@ def storer(lanes: Lanes) -> Any:
     @intrinsic
     def store(typingctx, memory, at, value):
         def lower(context, builder, sig, args):
-            builder.store(args[2], _place(context, builder, sig, args, lanes), align=8)
+            builder.store(args[2], _pointer_to_lanes(context, builder, sig, args, lanes), align=8)
             return context.get_dummy_value()
 
         return types.none(memory, types.intp, lanes), lower

@@ -126,6 +126,7 @@ def select_all(condition, a, b):
 
 
 def _select_all_in_kernel(condition: Any, a: Any, b: Any) -> Any:
+    """Body of :func:`select_all` for the types of its arguments."""
     others = [name for name, _ in _numbers(b, "b")]
     ones = [name for name, _ in _numbers(a, "a")]
     text, scope = _rebuilt(a, lambda kind, k: f"select(condition, {ones[k]}, {others[k]})")

@@ -62,7 +62,9 @@ class _Code:
 
 
 @intrinsic
-def _swing(typingctx, omega, sine, cosine, square, factors):
+def _swing_in_kernel(typingctx, omega, sine, cosine, square, factors):
+    """Form of :func:`swing` for kernels, in two lanes: cosine and sine side by side."""
+
     def lower(context, builder, sig, args):
         code = _Code(builder)
         rows = [
@@ -118,6 +120,6 @@ def _swing(typingctx, omega, sine, cosine, square, factors):
 
 specialise(
     swing,
-    lambda *kinds: lambda omega, sine, cosine, square, factors: _swing(omega, sine, cosine, square, factors),
+    lambda *kinds: lambda omega, sine, cosine, square, factors: _swing_in_kernel(omega, sine, cosine, square, factors),
     absorb=True,
 )

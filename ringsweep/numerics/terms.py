@@ -82,7 +82,9 @@ def powers(s):
 
 
 @intrinsic
-def _powers(typingctx, s):
+def _powers_in_kernel(typingctx, s):
+    """Form of :func:`powers` for kernels."""
+
     def lower(context, builder, sig, args):
         result, power = None, args[0]
         ones = ir.Constant(_TERMS_VECTOR, [1.0] * ORDER)
@@ -96,7 +98,7 @@ def _powers(typingctx, s):
     return _TERMS(types.float64), lower
 
 
-_in_kernels(powers, lambda s: _powers(s))
+_in_kernels(powers, lambda s: _powers_in_kernel(s))
 
 
 def total(values):
@@ -105,7 +107,9 @@ def total(values):
 
 
 @intrinsic
-def _total(typingctx, values):
+def _total_in_kernel(typingctx, values):
+    """Form of :func:`total` for kernels."""
+
     def lower(context, builder, sig, args):
         kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), args[0].type])
         add = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{args[0].type.count}f64")
@@ -115,7 +119,7 @@ def _total(typingctx, values):
     return types.float64(_TERMS), lower
 
 
-_in_kernels(total, lambda values: _total(values))
+_in_kernels(total, lambda values: _total_in_kernel(values))
 
 
 def least(values):
@@ -124,7 +128,9 @@ def least(values):
 
 
 @intrinsic
-def _least(typingctx, values):
+def _least_in_kernel(typingctx, values):
+    """Form of :func:`least` for kernels."""
+
     def lower(context, builder, sig, args):
         kind = ir.FunctionType(ir.DoubleType(), [args[0].type])
         fold = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fmin.v{args[0].type.count}f64")
@@ -133,7 +139,7 @@ def _least(typingctx, values):
     return types.float64(_TERMS), lower
 
 
-_in_kernels(least, lambda values: _least(values))
+_in_kernels(least, lambda values: _least_in_kernel(values))
 
 
 def sign_changes(values):
@@ -143,7 +149,9 @@ def sign_changes(values):
 
 
 @intrinsic
-def _sign_changes(typingctx, values):
+def _sign_changes_in_kernel(typingctx, values):
+    """Form of :func:`sign_changes` for kernels."""
+
     def lower(context, builder, sig, args):
         bits = ir.IntType(ORDER)
         zeros = ir.Constant(_TERMS_VECTOR, [0.0] * ORDER)
@@ -154,7 +162,7 @@ def _sign_changes(typingctx, values):
     return types.int64(_TERMS), lower
 
 
-_in_kernels(sign_changes, lambda values: _sign_changes(values))
+_in_kernels(sign_changes, lambda values: _sign_changes_in_kernel(values))
 
 
 # ---- products of several series ---------------------------------------------------------------
@@ -165,22 +173,25 @@ _in_kernels(sign_changes, lambda values: _sign_changes(values))
 
 def no_factors(like):
     """Factors before the first ones, for as many products as the tuple `like` is long, see :func:`set_factors`."""
-    return tuple((np.zeros(PRODUCTS), np.zeros(PRODUCTS)) for _ in range(_groups(len(like))))
+    return tuple((np.zeros(PRODUCTS), np.zeros(PRODUCTS)) for _ in range(_groups_for(len(like))))
 
 
-def _groups(products: int) -> int:
+def _groups_for(products: int) -> int:
+    """Number of groups of side-by-side factors that so many products need."""
     return -(-products // PRODUCTS)
 
 
 @intrinsic
-def _no_factor(typingctx):
+def _zero_factors(typingctx):
+    """A group of factors that are zero."""
     zeros = ir.Constant(ir.VectorType(ir.DoubleType(), PRODUCTS), [0.0] * PRODUCTS)
     return _FACTORS(), lambda context, builder, sig, args: zeros
 
 
 def _no_factors_in_kernel(like: Any) -> Any:
-    text = "(zeros(), zeros()), " * _groups(len(like))
-    return function_from_lines("like", [f"return ({text})"], {"zeros": _no_factor})
+    """Body of :func:`no_factors` for the type of its argument."""
+    text = "(zeros(), zeros()), " * _groups_for(len(like))
+    return function_from_lines("like", [f"return ({text})"], {"zeros": _zero_factors})
 
 
 specialise(no_factors, _no_factors_in_kernel, absorb=True)
@@ -205,7 +216,7 @@ def set_factors(c, row, k, left, right):
         The same numbers side by side, for :func:`inner_products`.
     """
     found = []
-    for group in range(_groups(len(left))):
+    for group in range(_groups_for(len(left))):
         pair = np.zeros((2, PRODUCTS))
         part = slice(group * PRODUCTS, (group + 1) * PRODUCTS)
         pair[0, : len(left[part])], pair[1, : len(right[part])] = left[part], right[part]
@@ -221,6 +232,8 @@ def _pairs(c: Any, row: int, count: int) -> Any:
 
 @intrinsic
 def _packed(typingctx, values):
+    """Vector of factors from a tuple of numbers."""
+
     def lower(context, builder, sig, args):
         vector = ir.Constant(ir.VectorType(ir.DoubleType(), PRODUCTS), ir.Undefined)
         for k in range(PRODUCTS):
@@ -233,6 +246,7 @@ def _packed(typingctx, values):
 
 @absorbed
 def _set_group(c, row, k, left, right):
+    """Store a group of left and right factors of coefficient `k` from row `row` on, and return both vectors."""
     at = row * c.shape[1] + k * (2 * PRODUCTS)
     a, b = _packed(left), _packed(right)
     _store_factors(c, at, a)
@@ -241,13 +255,15 @@ def _set_group(c, row, k, left, right):
 
 
 def _set_factors_in_kernel(c: Any, row: Any, k: Any, left: Any, right: Any) -> Any:
+    """Body of :func:`set_factors` for the types of its arguments."""
+
     def part(name: str, group: int) -> str:
         places = range(group * PRODUCTS, (group + 1) * PRODUCTS)
         return "(" + "".join(f"{name}[{i}], " if i < len(left) else "0.0, " for i in places) + ")"
 
     calls = (
         f"set_group(c, row + {group * FACTOR_ROWS}, k, {part('left', group)}, {part('right', group)}), "
-        for group in range(_groups(len(left)))
+        for group in range(_groups_for(len(left)))
     )
     return function_from_lines("c, row, k, left, right", [f"return ({''.join(calls)})"], {"set_group": _set_group})
 
@@ -284,6 +300,7 @@ def inner_products(c, row, k, first, newest):
 
 @intrinsic
 def _unpacked(typingctx, vector):
+    """Tuple of numbers from a vector of factors."""
     result = types.UniTuple(types.float64, PRODUCTS)
 
     def lower(context, builder, sig, args):
@@ -295,9 +312,10 @@ def _unpacked(typingctx, vector):
 
 @absorbed
 def _inner_products_of_group(c, row, k, first, newest):
+    """Sums of the products of older factors of one group, for coefficient `k`."""
     a = row * c.shape[1]
     b = a + (2 * k + 1) * PRODUCTS
-    even = odd = _no_factor()
+    even = odd = _zero_factors()
     # Of two sums each waits only for every second product. The newest factors come last, from registers, so that
     # nothing waits for the memory.
     for j in range(2, k - 2, 2):
@@ -314,6 +332,7 @@ def _inner_products_of_group(c, row, k, first, newest):
 
 
 def _inner_products_in_kernel(c: Any, row: Any, k: Any, first: Any, newest: Any) -> Any:
+    """Body of :func:`inner_products` for the types of its arguments."""
     lines, numbers = [], []
     for group in range(len(first)):
         lines.append(f"g{group} = of_group(c, row + {group * FACTOR_ROWS}, k, first[{group}], newest[{group}])")
@@ -331,6 +350,7 @@ def joined(a, b):
 
 
 def _joined_in_kernel(a: Any, b: Any) -> Any:
+    """Body of :func:`joined` for the types of its arguments."""
     numbers = [f"{name}[{i}], " for name, kind in (("a", a), ("b", b)) for i in range(len(kind))]
     return function_from_lines("a, b", [f"return ({''.join(numbers)})"], {})
 
@@ -344,6 +364,7 @@ def part_from(values, like, after):
 
 
 def _part_in_kernel(values: Any, like: Any, after: Any) -> Any:
+    """Body of :func:`part_from` for the types of its arguments."""
     numbers = [f"values[{i}], " for i in range(len(after), len(after) + len(like))]
     return function_from_lines("values, like, after", [f"return ({''.join(numbers)})"], {})
 

@@ -46,9 +46,11 @@ class _Writer:
     count: int = 0
 
     def write(self, line: str) -> None:
+        """Append a line."""
         self.lines.append(self.indent + line)
 
     def new(self, text: str) -> str:
+        """Append the definition of a new name, and return the name."""
         self.count += 1
         self.write(f"n{self.count} = {text}")
         return f"n{self.count}"
@@ -147,14 +149,15 @@ def float_lines(names: Mapping[str, str], outputs: list[Node], side: str) -> lis
     """
     writer = _Writer(names)
     writer.constants(*outputs)
-    _floats(writer, outputs, side)
+    _write_for_floats(writer, outputs, side)
     writer.write("return (" + "".join(f"{writer.known[output]}, " for output in outputs) + ")")
     return writer.lines
 
 
-def _floats(writer: _Writer, outputs: list[Node], side: str) -> None:
+def _write_for_floats(writer: _Writer, outputs: list[Node], side: str) -> None:
+    """Write the lines of `outputs` for floats: each switch becomes an ``if``."""
     for threshold, switches in _frontier(outputs, writer.known).items():
-        _branch(writer, switches, side.format(threshold), partial(_floats, writer, side=side))
+        _branch(writer, switches, side.format(threshold), partial(_write_for_floats, writer, side=side))
     _straight(writer, outputs)
 
 
@@ -196,7 +199,7 @@ def lanes_lines(names: Mapping[str, str], outputs: list[Node], threshold: str) -
     """Body that returns the values of `outputs` in vector lanes; ``{}`` in `threshold` stands for an index."""
     writer = _Writer(names)
     writer.constants(*outputs)
-    _lanes(writer, outputs, threshold, "")
+    _write_for_lanes(writer, outputs, threshold, "")
     writer.write("return (" + "".join(f"{writer.known[output]}, " for output in outputs) + ")")
     return writer.lines
 
@@ -211,7 +214,11 @@ def _calls(parts: list[Node], known: Mapping[Node, str]) -> bool:
     )
 
 
-def _lanes(writer: _Writer, outputs: list[Node], threshold: str, context: str) -> None:
+def _write_for_lanes(writer: _Writer, outputs: list[Node], threshold: str, context: str) -> None:
+    """Write the lines of `outputs` for vector lanes: both sides of each switch, where some lane needs them.
+
+    `threshold` is the source text of a threshold, `context` that of the mask within which the lines stand.
+    """
     for index, switches in _frontier(outputs, writer.known).items():
         limit = threshold.format(index)
         conditions = [writer.new(f"speed < {limit}"), writer.new(f"speed >= {limit}")]
@@ -224,12 +231,12 @@ def _lanes(writer: _Writer, outputs: list[Node], threshold: str, context: str) -
                 targets = [writer.new("spread(0.0)") for _ in parts]
                 mask = writer.new(mask)
                 with writer.block(f"if any_of({mask}):"):
-                    _lanes(writer, parts, threshold, mask)
+                    _write_for_lanes(writer, parts, threshold, mask)
                     for target, part in zip(targets, parts, strict=True):
                         writer.write(f"{target} = spread({writer.known[part]})")
                 found.append(targets)
             else:
-                _lanes(writer, parts, threshold, mask)
+                _write_for_lanes(writer, parts, threshold, mask)
                 found.append([writer.known[part] for part in parts])
         for node, below, above in zip(switches, *found, strict=True):
             writer.known[node] = writer.new(f"select({conditions[0]}, {below}, {above})")
@@ -364,7 +371,7 @@ def singular(node: Node) -> Node | None:
 def _sharpen(writer: _Writer, inner: Node, unit: str, scale: float, side: str) -> None:
     """Take the rate at which an expression changes, in a unit, into the sharpness."""
     rates = [derivative(inner), derivative(derivative(inner))]
-    _floats(writer, rates, side)
+    _write_for_floats(writer, rates, side)
     first, second = (writer.known[rate] for rate in rates)
     share = "" if unit == "1.0" else f" / {unit}"
     change = f"abs({first}){share} + 2.0 * sqrt_of(0.5 * abs({second}){share})"
@@ -515,7 +522,7 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, f
     coefficients = {node: _coefficients(node) for node in every if node in needed and is_polynomial(node)}
     numbers = [one for several in coefficients.values() for one in several]
     writer.constants(value, *found, *numbers)
-    _floats(writer, [value, *place, *numbers], side)
+    _write_for_floats(writer, [value, *place, *numbers], side)
 
     stored: set[int] = set()
     lags: dict[int, int] = dict.fromkeys(place.values(), 1)
@@ -608,7 +615,7 @@ def reach_lines(names: Mapping[str, str], output: Node, side: str) -> list[str]:
     for inner, distance in bounds:
         parts = [inner, derivative(inner), derivative(derivative(inner))]
         writer.constants(*parts)
-        _floats(writer, parts, side)
+        _write_for_floats(writer, parts, side)
         value, first, second = (writer.known[part] for part in parts)
         writer.write(f"h = min(h, time_of({distance.format(value)}, {first}, {second}))")
     return writer.lines
