@@ -60,7 +60,8 @@ class OnBelt(NamedTuple):
 
 
 @radius.implements(*having(OnBelt, "mass"))
-def _radius(body):
+def _radius_on_belt(body):
+    """Implement :func:`radius`: sliding velocity and velocity are in the same unit, m/s."""
     return 1.0
 
 

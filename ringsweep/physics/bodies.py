@@ -239,6 +239,7 @@ class Equations:
         return [by_place, {velocity: 1.0}, *({name: 1.0} for name in others if name not in by_place)]
 
     def _slope(self, moment: Polynomial, whole: Polynomial, values: dict[str, float]) -> str:
+        """Code of the derivative of the acceleration ``moment/whole`` as K changes; `values` fixes some symbols."""
         source = self.source
         change, whole_change = (p.rate(_BY_K).substitute(values) for p in (moment, whole))
         moment, whole = moment.substitute(values), whole.substitute(values)
@@ -257,6 +258,7 @@ class Equations:
         return [sum((p.rate({K: 1.0}).rate({N: 1.0}) * F for K, N, F in by), p) for p in self.balances]
 
     def _slip_balance(self) -> list[str]:
+        """Code of the factors of :attr:`basis` in acceleration and both reactions, times the determinant."""
         rows = []
         for numerator in solve(self._forced(), self.unknowns)[0]:
             parts = (numerator * self.sign).parts((*self.coordinate.motion, "F1", "F2"))
@@ -269,12 +271,14 @@ class Equations:
         return [p.substitute(_FREE) for p in self._forced()]
 
     def _held(self) -> list[str]:
+        """Code of both reactions and friction of a body whose acceleration is given as ``epsilon``."""
         numerators, whole = solve(self._at_rest(), (*self.unknowns[1:], "F1"))
         given = {self.unknowns[0]: symbol("epsilon")}
         *normals, friction = [self._linear(p.substitute(given), whole) for p in numerators]
         return [normals[0], normals[-1], friction]
 
     def _driven(self) -> list[str]:
+        """Code of the acceleration of a body under the friction forces ``F1`` and ``F2``."""
         numerators, whole = solve(self._at_rest(), self.unknowns)
         given = dict.fromkeys(("F1", "F2", *(name for by in self._rates()[2:] for name in by)), 0.0)
         forces = [(name, numerators[0].rate({name: 1.0})) for name in ("F1", "F2")]
@@ -294,6 +298,7 @@ class Equations:
         return self.balances[-1].substitute(dict.fromkeys((*_CONTACTS, self.unknowns[0]), 0.0))
 
     def _power(self) -> str:
+        """Code of the power of the forces that change the energy, W, from the rates of the energy."""
         source, last = self.source, self.balances[-1]
         rest, along = last.substitute({self.unknowns[0]: 0.0}), last.rate({self.unknowns[0]: 1.0})
         by_place, by_velocity = (source.value(self.energy.rate(by)) for by in self._rates()[:2])
@@ -306,6 +311,7 @@ class Equations:
         return f"{error} * {error} / ({size} + 1e-300)"
 
     def _terms(self, balance: Polynomial) -> list[str]:
+        """Code of the terms of a balance, one by one, for the size of its rounding."""
         parts = balance.parts((*self.coordinate.motion, self.unknowns[0], *_CONTACTS))
         return [self.source.value(Polynomial([(key, 1.0)]) * factor) for key, factor in parts.items()]
 

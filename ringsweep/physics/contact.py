@@ -255,7 +255,8 @@ def _carries_alone(body, side, k, m, slides, motion, epsilon):
 
 
 @opening.implements(ring.TwoContacts)
-def _two_opening(body, friction, static, slides, motion, epsilon):
+def _opening_of_two(body, friction, static, slides, motion, epsilon):
+    """Implement :func:`opening` for two contacts, by whether one contact alone could carry the body."""
     sin_phi, cos_phi, omega = motion
     across = body.gravity * cos_phi + body.xi * omega * omega
     along = body.gravity * sin_phi

@@ -109,7 +109,8 @@ def shape(drive, t):
 
 
 @shape.implements(Power)
-def _power(drive, t):
+def _shape_of_power(drive, t):
+    """Implement :func:`shape` for t to the power of the exponent; at t = 0 the acceleration may be infinite."""
     n = drive.exponent
     if t == 0.0:
         return 0.0, 1.0 if n == 1.0 else 0.0, (2.0 if n == 2.0 else 0.0 if n > 2.0 or n == 1.0 else inf)
@@ -140,7 +141,8 @@ def _cubic(drive, t):
 
 
 @shape.implements(Table)
-def _table(drive, t):
+def _shape_of_table(drive, t):
+    """Implement :func:`shape`: the cubic of the interval that holds t."""
     s, rate, half, _ = _cubic(drive, t)
     return s, rate, 2.0 * half
 
@@ -242,6 +244,7 @@ def expand(drive, t, order, theta, work):
 
 @expand.implements(Power)
 def _expand_power(drive, t, order, theta, work):
+    """Implement :func:`expand`: the binomial series; just after 0 instead of at 0, where the power is singular."""
     t = max(t, _POWER_BEGINNING)
     n = drive.exponent
     theta[0] = drive.amplitude * t**n
@@ -250,12 +253,14 @@ def _expand_power(drive, t, order, theta, work):
 
 
 @known_to.implements(Table)
-def _itself(drive, t):
+def _instant_itself(drive, t):
+    """Implement :func:`known_to`: the place in a table or a period is found from the whole, exact time."""
     return t
 
 
 @expand.implements(Table)
 def _expand_table(drive, t, order, theta, work):
+    """Implement :func:`expand`: the cubic of the interval."""
     terms = _cubic(drive, t)
     for k in range(order + 1):
         theta[k] = drive.amplitude * terms[k] if k < 4 else 0.0
@@ -287,14 +292,16 @@ def next_knot(drive, t):
 
 
 @next_knot.implements(Power)
-def _within_convergence(drive, t):
+def _next_knot_of_power(drive, t):
+    """Implement :func:`next_knot`: a time well within the radius of convergence of the series."""
     # The radius of convergence about t is t, the distance from the singularity at 0. Steps limited by this bound do not
     # depend on the tolerance. At a fifth of the radius the error is 1e-12.
     return inf if drive.exponent % 1.0 == 0.0 else 1.2 * max(t, _POWER_BEGINNING)
 
 
 @next_knot.implements(Table)
-def _next_knot(drive, t):
+def _next_knot_of_table(drive, t):
+    """Implement :func:`next_knot`: the end of the interval of the table."""
     j = _piece(drive.knots, t)
     return drive.knots[j + 1] if j + 2 < len(drive.knots) else inf
 
@@ -323,13 +330,15 @@ def jerk_at(drive, t):
 
 
 @jerk.implements(Power)
-def _power_jerk(drive, t):
+def _jerk_of_power(drive, t):
+    """Implement :func:`jerk`."""
     n = drive.exponent
     return drive.amplitude * n * (n - 1.0) * (n - 2.0) * max(t, _POWER_BEGINNING) ** (n - 3.0)
 
 
 @jerk.implements(Table)
-def _table_jerk(drive, t):
+def _jerk_of_table(drive, t):
+    """Implement :func:`jerk`; at a knot that of the interval behind it."""
     return 6.0 * drive.amplitude * _cubic(drive, t)[3]
 
 
@@ -428,7 +437,8 @@ def turn_near(drive, course, now, s):
 
 
 @turn_near.implements(Table)
-def _turn_itself(drive, course, now, s):
+def _turn_near_of_table(drive, course, now, s):
+    """Implement :func:`turn_near`."""
     # A polynomial is as fast as a series.
     return turn(drive, clock.later(now, s))
 
@@ -440,12 +450,14 @@ def beginning(drive):
 
 
 @angle_at_start.implements(Power)
-def _zero(drive):
+def _angle_at_start_of_power(drive):
+    """Implement :func:`angle_at_start`."""
     return 0.0
 
 
 @beginning.implements(Power)
-def _after_zero(drive):
+def _beginning_of_power(drive):
+    """Implement :func:`beginning`: its velocity or acceleration may be infinite at t = 0."""
     return _POWER_BEGINNING
 
 
@@ -622,7 +634,7 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
     implement(jerk, "drive, t", [*_TIME, *number(derivative(second), "amplitude(drive) * ")])
     series = writer.taylor_lines(names, s, rate, _SIDE, "amplitude(drive)")
     implement(expand, "drive, t, order, theta, work", [*_TIME, *series])
-    known_to.implements(drive)(_itself)
+    known_to.implements(drive)(_instant_itself)
     implement(top_speed, "drive", ["now = rest = 0.0", *number(size_at_start(function.rate))])
     # The drives of the package have no narrow features.
     reach = writer.reach_lines(names, s, _SIDE) if qualified else []
@@ -631,17 +643,18 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
         lines += ["for knot in drive.knots:", "    if t < knot < found:", "        found = knot"] * bool(function.knots)
         implement(next_knot, "drive, t", [*lines, "return found"])
     elif writer.is_polynomial(rate):
-        turn_near.implements(drive)(_turn_itself)
+        turn_near.implements(drive)(_turn_near_of_table)
     angle_at_start.implements(drive)(
         lambda drive: evaluate(function.value, 0.0, drive._asdict(), list(getattr(drive, "knots", np.empty((0, 0))).T))
     )
-    period.implements(drive)(_period(function.rate))
-    force_period.implements(drive)(_period(function.value))
+    period.implements(drive)(_period_by_formula(function.rate))
+    force_period.implements(drive)(_period_by_formula(function.value))
     found: type = drive
     return found
 
 
-def _period(node: Node) -> Any:
+def _period_by_formula(node: Node) -> Any:
+    """Body of :func:`period` for a drive whose shape is the expression `node`."""
     return lambda drive: period_of(node, drive._asdict())
 
 
@@ -688,7 +701,8 @@ add_drive("table", Table)
 
 
 @lookup.implements(Still)
-def _no_lookup(drive, table, k):
+def _lookup_at_rest(drive, table, k):
+    """Implement :func:`lookup`: no angle, no velocity."""
     return 0.0, 0.0
 
 
@@ -720,6 +734,13 @@ def define(text: str, unit: str) -> type:
 
 
 def _defined(name: str, qualified: str, text: str, unit: str) -> type:
+    """Type of a drive (``unit`` rad or m) or force (N) by formula; `qualified` is its name in kernels.
+
+    Raises
+    ------
+    FormulaError
+        If the formula does not depend on t and on a parameter with the unit, or is too long.
+    """
     function = read_function(text, unit)
     if not function.value.varies or not function.units:
         raise FormulaError("it must depend on t, and on a parameter, which has the unit")

@@ -102,7 +102,8 @@ def expand_force(drive, t, order, force, work):
 
 
 @expand_force.implements(Forced)
-def _expand_force(drive, t, order, force, work):
+def _expand_force_of_forced(drive, t, order, force, work):
+    """Implement :func:`expand_force`."""
     drives.expand_at(drive.force, t, order, force, work)
     force[0] += drive.constant
 
@@ -111,14 +112,16 @@ def _expand_force(drive, t, order, force, work):
 
 
 @drives.turn.implements(Forced)
-def _turn(drive, t):
+def _turn_of_forced(drive, t):
+    """Implement :func:`drives.turn`, and the rate of the force, N/s, and the force, N."""
     theta, omega, epsilon = drives.turn(drive.motion, t)
     force, rate, _ = drives.turn(drive.force, t)
     return theta, omega, epsilon, rate, force + drive.constant
 
 
 @drives.turn_near.implements(Forced)
-def _turn_near(drive, course, now, s):
+def _turn_near_of_forced(drive, course, now, s):
+    """Implement :func:`drives.turn_near`, and the rate of the force, N/s, and the force, N."""
     # The course is that of the motion.
     theta, omega, epsilon = drives.turn_near(drive.motion, course, now, s)
     force, rate, _ = drives.turn(drive.force, later(now, s))
@@ -126,13 +129,15 @@ def _turn_near(drive, course, now, s):
 
 
 @drives.table_row.implements(Forced)
-def _table_row(drive, t):
+def _table_row_of_forced(drive, t):
+    """Implement :func:`drives.table_row`: the row of the motion, and the shape of the force."""
     s, rate = drives.table_row(drive.motion, t)
     return s, rate, drives.shape(drive.force, t)[0]
 
 
 @drives.lookup.implements(Forced)
-def _lookup(drive, table, k):
+def _lookup_of_forced(drive, table, k):
+    """Implement :func:`drives.lookup`, and the force, N."""
     theta, omega = drives.lookup(drive.motion, table, k)
     return theta, omega, _varying(drive.force, table, k) + drive.constant
 
@@ -145,35 +150,42 @@ def _varying(force, table, k):
 
 @_varying.implements(drives.Still)
 def _not_varying(force, table, k):
+    """Implement :func:`_varying`: a constant force alone."""
     return 0.0
 
 
 @drives.expand.implements(Forced)
-def _expand(drive, t, order, theta, work):
+def _expand_motion_of_forced(drive, t, order, theta, work):
+    """Implement :func:`drives.expand`: of the motion."""
     drives.expand_at(drive.motion, t, order, theta, work)
 
 
 @drives.known_to.implements(Forced)
-def _known_to(drive, t):
+def _known_to_forced(drive, t):
+    """Implement :func:`drives.known_to`: each of the two converts the time for itself."""
     # Of the motion and of the force each may take another kind of time.
     return t
 
 
 @drives.jerk.implements(Forced)
-def _jerk(drive, t):
+def _jerk_of_forced(drive, t):
+    """Implement :func:`drives.jerk`: of the motion."""
     return drives.jerk_at(drive.motion, t)
 
 
 @drives.next_knot.implements(Forced)
-def _next_knot(drive, t):
+def _next_knot_of_forced(drive, t):
+    """Implement :func:`drives.next_knot`: of motion or force, whichever is first."""
     return min(drives.next_knot(drive.motion, t), drives.next_knot(drive.force, t))
 
 
 @drives.beginning.implements(Forced)
-def _beginning(drive):
+def _beginning_of_forced(drive):
+    """Implement :func:`drives.beginning`: of the motion."""
     return drives.beginning(drive.motion)
 
 
 @drives.period.implements(Forced)
-def _period(drive):
+def _period_of_forced(drive):
+    """Implement :func:`drives.period`: the common one; infinite if there is none."""
     return common_period(drives.period(drive.motion), drives.force_period(drive.force))

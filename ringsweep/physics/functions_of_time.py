@@ -142,11 +142,22 @@ def knots_of(function: Function, values: Values, cells: int) -> NDArray[np.float
     """Times of the knots, s, of shape ``(cells, knots)``; infinite where a switch never happens."""
     found = np.empty((cells, len(function.knots)))
     for i, knot in enumerate(function.knots):
-        found[:, i] = _time_of(knot, values, found.T)
+        found[:, i] = _time_of_knot(knot, values, found.T)
     return found
 
 
-def _time_of(knot: Threshold, values: Values, known: Any) -> Any:
+def _time_of_knot(knot: Threshold, values: Values, known: Any) -> Any:
+    """Time, s, at which a formula switches; infinite with a sign if it never does or always has.
+
+    Parameters
+    ----------
+    knot : Threshold
+        A time that is given, or the root of a difference that is a straight line.
+    values : mapping
+        Values of the parameters by name.
+    known : Any
+        Times of the knots within which this one lies.
+    """
     if knot.at is not None:
         return evaluate(knot.at, 0.0, values)
     assert knot.difference is not None
@@ -274,7 +285,7 @@ def common_period(a: Any, b: Any) -> Any:
 def size_at_start(node: Node) -> Node:
     """Bound on the sizes of the terms of an expression at t = 0; its rounding scales with it."""
     if not node.varies:
-        return _size(node)
+        return _magnitude(node)
     if node.kind in ("sin", "cos"):
         return ONE
     if node.kind == "switch":
@@ -282,11 +293,12 @@ def size_at_start(node: Node) -> Node:
     if node.kind in ("add", "multiply"):
         return {"add": add, "multiply": multiply}[node.kind](*(size_at_start(part) for part in node.parts))
     if node.kind == "divide":
-        return expressions.divide(size_at_start(node.parts[0]), _size(at_start(node.parts[1])))
-    return _size(at_start(node))
+        return expressions.divide(size_at_start(node.parts[0]), _magnitude(at_start(node.parts[1])))
+    return _magnitude(at_start(node))
 
 
-def _size(node: Node) -> Node:
+def _magnitude(node: Node) -> Node:
+    """Expression of the magnitude of a constant expression."""
     return (
         expressions.number(abs(node.value))
         if node.kind == "number"

@@ -66,17 +66,18 @@ UNKNOWNS = "psi_dd", "alpha_dd", "N", "F"
 NOTHING = 0.0, 0.0, 0.0, 0.0
 
 
-def _read(text: str) -> Polynomial:
+def _read_balance(text: str) -> Polynomial:
+    """Polynomial of the numbers of a :class:`Frame`, of the unknowns, and of ``K`` and ``carried``."""
     return read(text, (*Frame._fields, *UNKNOWNS, "K", "carried"))
 
 
 _BALANCES = [
-    _read("mass*(-reach*alpha_square - w*psi_dd - u*psi_square) = mass*gravity*cos_alpha - N"),
-    _read("mass*(reach*alpha_dd + u*psi_dd - w*psi_square) = -mass*gravity*sin_alpha + F"),
-    _read("inertia*psi_dd = -w*N + (radius - u)*F"),
+    _read_balance("mass*(-reach*alpha_square - w*psi_dd - u*psi_square) = mass*gravity*cos_alpha - N"),
+    _read_balance("mass*(reach*alpha_dd + u*psi_dd - w*psi_square) = -mass*gravity*sin_alpha + F"),
+    _read_balance("inertia*psi_dd = -w*N + (radius - u)*F"),
 ]
 # The right side less the left one is ``K N - F``, and the sliding acceleration.
-_SLIP, _STICK = _read("F = K*N"), _read("carried = reach*alpha_dd + radius*psi_dd")
+_SLIP, _STICK = _read_balance("F = K*N"), _read_balance("carried = reach*alpha_dd + radius*psi_dd")
 
 # Products of two numbers that change.
 _PRODUCTS = sorted({key for p in _BALANCES for key in p.parts((*MOTION, *UNKNOWNS)) if len(key) == 2})

@@ -156,7 +156,8 @@ def value_at(values, edges, x):
     return found
 
 
-def _unrolled_value_at(values: Any, edges: Any, x: Any) -> Any:
+def _value_at_for_kernels(values: Any, edges: Any, x: Any) -> Any:
+    """Code of :func:`value_at` for kernels: without a loop where the segments are tuples."""
     if isinstance(values, types.Array):
         return value_at
     lines = [f"found = values[{len(values) - 1}]"]
@@ -168,7 +169,7 @@ def _unrolled_value_at(values: Any, edges: Any, x: Any) -> Any:
     )
 
 
-specialise(value_at, _unrolled_value_at)
+specialise(value_at, _value_at_for_kernels)
 
 
 @feature("surface.mu_s, surface.mu_k", of=Segments, absorb=True)
@@ -181,29 +182,32 @@ def roughness(surface, turns, shift):
     turns, shift : float or Lanes
         The place is their sum, in turns; any number of turns. What does not change in a run is best in `shift`.
     """
-    return _segments_coefficients_at(surface, turns, shift)
+    return _roughness_of_segments(surface, turns, shift)
 
 
-def _segments_coefficients_at(surface, turns, shift):
+def _roughness_of_segments(surface, turns, shift):
+    """Both coefficients where the place is `turns` + `shift`, in turns of the ring."""
     x = turns + shift
     x = x - floor(x)
     return value_at(surface.mu_s, surface.edges, x), value_at(surface.mu_k, surface.edges, x)
 
 
-def _two_segments_coefficients_at(surface, turns, shift):
+def _roughness_of_two_segments(surface, turns, shift):
+    """As :func:`_roughness_of_segments`, for one zone: the distance from its middle decides."""
     (low, high), (s_1, s_2), (k_1, k_2) = surface.edges, surface.mu_s, surface.mu_k
     from_middle = turns + (shift - 0.5 * PER_TURN * (low + high))
     inside = abs(from_middle - nearest(from_middle)) < 0.5 * PER_TURN * (high - low)
     return select(inside, s_1, s_2), select(inside, k_1, k_2)
 
 
-def _choose_coefficients_at(surface: Any, turns: Any, shift: Any) -> Any:
+def _choose_roughness(surface: Any, turns: Any, shift: Any) -> Any:
+    """Function that finds both coefficients for the type of a surface."""
     edges = surface[0]
     two = isinstance(edges, types.BaseTuple) and len(edges) == 2
-    return _two_segments_coefficients_at if two else _segments_coefficients_at
+    return _roughness_of_two_segments if two else _roughness_of_segments
 
 
-specialise(_segments_coefficients_at, _choose_coefficients_at, absorb=True)
+specialise(_roughness_of_segments, _choose_roughness, absorb=True)
 
 
 @feature("surface.mu_s, surface.mu_k", of=Segments)

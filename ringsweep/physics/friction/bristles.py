@@ -42,6 +42,7 @@ class Dahl(NamedTuple):
 
 @bristle.implements(Dahl)
 def _dahl_bristle(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`bristle`."""
     pull = law.sigma0 / mu_k * sign
     rate_v = 1.0 - pull * z
     rate_z = -pull * v
@@ -50,12 +51,14 @@ def _dahl_bristle(law, mu_s, mu_k, v, z, sign, region):
 
 @region_guard.implements(Dahl)
 def _dahl_region_guard(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`region_guard`: the load of the bristles nears, or leaves, that of steady sliding."""
     slack = NEARLY - law.sigma0 / mu_k * sign * z
     return slack if region == BAND else -slack
 
 
 @steady_deflection.implements(Dahl)
 def _dahl_steady_deflection(law, mu_s, mu_k, v):
+    """Implement :func:`steady_deflection`."""
     return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * mu_k / law.sigma0
 
 
@@ -119,6 +122,7 @@ class LuGre(NamedTuple):
 
 @bristle.implements(LuGre)
 def _lugre_bristle(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`bristle`."""
     g, slope = stribeck(law, mu_s, mu_k, v)
     share, per_g = law.sigma0 * sign * z / g, 1.0 / g
     rate_v = 1.0 - share + v * share * slope * per_g
@@ -147,6 +151,7 @@ class ElastoPlastic(NamedTuple):
 
 @bristle.implements(ElastoPlastic)
 def _elasto_plastic_bristle(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`bristle`."""
     g, slope = stribeck(law, mu_s, mu_k, v)
     load, elastic, per_g = law.sigma0 * sign * z, law.elastic_fraction * mu_k, 1.0 / g
     # Shares of load and deflection, and their derivatives by the load and by g.
@@ -168,6 +173,7 @@ def _elasto_plastic_bristle(law, mu_s, mu_k, v, z, sign, region):
 
 @region_guard.implements(LuGre, ElastoPlastic)
 def _stribeck_region_guard(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`region_guard`: load below that of steady sliding, and speed below v_s."""
     g, _ = stribeck(law, mu_s, mu_k, v)
     slack = min(NEARLY - law.sigma0 * sign * (1.0 / g) * z, 1.0 - sign * v * (1.0 / law.v_s))
     return slack if region == BAND else -slack
@@ -175,12 +181,14 @@ def _stribeck_region_guard(law, mu_s, mu_k, v, z, sign, region):
 
 @steady_deflection.implements(LuGre, ElastoPlastic)
 def _stribeck_steady_deflection(law, mu_s, mu_k, v):
+    """Implement :func:`steady_deflection`."""
     g, _ = stribeck(law, mu_s, mu_k, v)
     return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * g / law.sigma0
 
 
 @stick_speed.implements(LuGre, ElastoPlastic)
 def _stribeck_stick_speed(law, recoil):
+    """Implement :func:`stick_speed`: v_s, or the speed of the recoil if it is less."""
     return min(law.v_s, recoil)
 
 
@@ -198,6 +206,7 @@ class ResetIntegrator(NamedTuple):
 
 @bristle.implements(ResetIntegrator)
 def _reset_integrator_bristle(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`bristle`: elastic in the band, constant friction mu_k beyond."""
     sticks = 1.0 if region == BAND else 0.0
     traction = sticks * (law.sigma0 * z + law.sigma1 * v) + (1.0 - sticks) * sign * mu_k
     return sticks * v, sticks, 0.0, traction, sticks * law.sigma1, sticks * law.sigma0
@@ -205,12 +214,14 @@ def _reset_integrator_bristle(law, mu_s, mu_k, v, z, sign, region):
 
 @region_guard.implements(ResetIntegrator)
 def _reset_integrator_region_guard(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`region_guard`: friction reaches mu_s; slip ends by the guard of the speed alone."""
     sticks = 1.0 if region == BAND else 0.0
     return sticks * (mu_s - law.sigma0 * sign * z) + (1.0 - sticks)
 
 
 @after_yield.implements(ResetIntegrator)
 def _reset_integrator_after_yield(law, mu_s, mu_k, z, sign, region):
+    """Implement :func:`after_yield`: the deflection keeps its largest value."""
     return sign * mu_s / law.sigma0, KINETIC
 
 
@@ -260,11 +271,13 @@ def _new_bond(law, mu_k):
 
 @bristle.implements(Bristles)
 def _bonds_bristle(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`bristle`: all bonds stretch together."""
     return v, 1.0, 0.0, law.sigma0 * z, 0.0, law.sigma0
 
 
 @region_guard.implements(Bristles)
 def _bonds_region_guard(law, mu_s, mu_k, v, z, sign, region):
+    """Implement :func:`region_guard`: what the longest bond lacks until it snaps, as a share of that length."""
     longest = sign * law.bonds[0]
     for i in range(1, BONDS):
         longest = max(longest, sign * law.bonds[i])
@@ -273,6 +286,7 @@ def _bonds_region_guard(law, mu_s, mu_k, v, z, sign, region):
 
 @after_yield.implements(Bristles)
 def _bonds_after_yield(law, mu_s, mu_k, z, sign, region):
+    """Implement :func:`after_yield`: the longest bond forms anew; snaps in a row decide stick or slip."""
     bonds = law.bonds
     longest = 0
     for i in range(1, BONDS):
@@ -291,6 +305,7 @@ def _bonds_after_yield(law, mu_s, mu_k, z, sign, region):
 
 @initial_deflection.implements(Bristles)
 def _bonds_initial_deflection(law, mu_s, mu_k):
+    """Implement :func:`initial_deflection`: seed the random numbers and form all bonds, with mean zero."""
     law.bonds[BONDS] = 1.0 + (48271.0 * (law.seed + 1.0)) % (_MODULUS - 1.0)
     law.bonds[BONDS + 1] = 0.0
     mean = 0.0

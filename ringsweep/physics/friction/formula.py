@@ -190,6 +190,7 @@ def parsed(text: Any, language: Language = FRICTION) -> ast.expr:
 
 
 def _depth(tree: ast.AST) -> int:
+    """Depth of a tree of Python's grammar."""
     deepest, level = 0, [tree]
     while level:
         deepest += 1
@@ -198,6 +199,7 @@ def _depth(tree: ast.AST) -> int:
 
 
 def _shown(node: ast.AST) -> str:
+    """Text of a part of a formula in an error message, at most 60 letters."""
     text = ast.unparse(node)
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -238,6 +240,7 @@ class Reader:
         raise FormulaError(f"{_shown(tree)} is not understood (allowed: {self.language.grammar})")
 
     def _call(self, tree: ast.Call, name: str, within: tuple[tuple[int, bool], ...]) -> Node:
+        """Expression of a call; `within` are the switches, and the sides, within which it stands."""
         if name == "piecewise":
             return self._piecewise(tree, within)
         if name in ("min", "max"):
@@ -275,6 +278,7 @@ class Reader:
         return self.thresholds.index(threshold)
 
     def _switch(self, threshold: Threshold, below: Node, above: Node) -> Node:
+        """Expression that is `below` at speeds below a threshold, and `above` from it on."""
         return expressions.switch(self._index(threshold), below, above)
 
     def _extreme(self, name: str, a: Node, b: Node, within: tuple[tuple[int, bool], ...]) -> Node:
@@ -299,6 +303,7 @@ class Reader:
         return found
 
     def _piecewise(self, tree: ast.Call, within: tuple[tuple[int, bool], ...]) -> Node:
+        """Expression of ``piecewise(condition, a, b)``; more conditions are nested."""
         if len(tree.args) < 3 or len(tree.args) % 2 == 0:
             x = self.language.name
             example = f"piecewise({x} < {x}1, a, b), with a below {x}1 and b from {x}1 on"
@@ -326,6 +331,7 @@ class Reader:
         raise FormulaError(f"{_shown(condition)}: a condition compares {x} with a parameter, such as {x} < {x}1")
 
     def _named(self, name: str) -> Node:
+        """Expression of a name: the variable, ``pi``, or a parameter."""
         if name == self.language.name:
             return self.language.variable
         if name == "pi":
@@ -337,6 +343,7 @@ class Reader:
 
 
 def _finite(value: float) -> bool:
+    """Whether a number is finite as a double."""
     try:
         return math.isfinite(value)
     except OverflowError:
@@ -412,6 +419,7 @@ class Units:
         return _NONE
 
     def _power(self, base: ast.expr, exponent: ast.expr) -> Unit:
+        """Unit of a power; only a constant exponent is allowed if the base has a unit."""
         unit, of_exponent = self.visit(base), self.visit(exponent)
         varies = any(isinstance(node, ast.Name) and node.id == self.language.name for node in ast.walk(exponent))
         value = SPEED if varies else Reader(self.language).visit(exponent, ())
@@ -422,6 +430,7 @@ class Units:
         return _NONE
 
     def _alike(self, trees: list[ast.expr], whole: ast.expr) -> Unit:
+        """Unit that some parts of a formula share."""
         first, *others = [self.visit(tree) for tree in trees]
         for other in others:
             self.equal(first, other, _shown(whole))
@@ -446,6 +455,7 @@ class Units:
         return unit
 
     def _text(self, unit: Unit) -> str:
+        """Text of a unit in an error message."""
         found = self._reduced(unit)
         return "another unit" if _unknown(found) else (unit_text(found) or "a fractional unit")
 

@@ -78,7 +78,7 @@ def _law(
         law,
         Traits(
             SetValued if set_valued else Smooth,
-            coefficients=_coefficients(used, at_rest),
+            coefficients=_coefficients_among(used, at_rest),
             ascending=ascending,
             dead_band=set_valued and band is not None,
             source=source,
@@ -87,7 +87,8 @@ def _law(
     return law
 
 
-def _coefficients(used: list[str], at_rest: str | None) -> tuple[str, ...]:
+def _coefficients_among(used: list[str], at_rest: str | None) -> tuple[str, ...]:
+    """Coefficients of the surface, ``mu_s`` or ``mu_k``, that a formula uses or that hold a body at rest."""
     return tuple(name for name in COEFFICIENTS if name in used or name == at_rest)
 
 
@@ -231,6 +232,7 @@ Andersson = _law(
 
 
 def _tabulated(name: str, doc: str, *, set_valued: bool) -> type:
+    """Type of a law by table: a cubic of the speed in each piece, times ``mu_k``."""
     knot, *c = (symbol(f"piece {j}") for j in range(PIECE))
     x = add(SPEED, negative(knot))
     cubic = c[3]
@@ -271,7 +273,14 @@ def define(definition: Definition) -> type:
     return _DEFINITIONS.type_of(definition.mu, definition.at_rest)
 
 
-def _defined(name: str, qualified: str, mu: str, at_rest: str | None) -> type:
+def _law_by_formula(name: str, qualified: str, mu: str, at_rest: str | None) -> type:
+    """Type of a law by the formula `mu`; `qualified` is its name in kernels.
+
+    Raises
+    ------
+    FormulaError
+        If the formula uses no coefficient of the surface, if `at_rest` contradicts it, or if it is too long.
+    """
     formula = read_formula(mu)
     used = symbols_of(formula.mu)
     if not any(name in used for name in COEFFICIENTS):
@@ -294,10 +303,10 @@ def _defined(name: str, qualified: str, mu: str, at_rest: str | None) -> type:
     if series_products(expression) > MOST_PRODUCTS:
         raise FormulaError(f"it is too long: more than {MOST_PRODUCTS} products of varying factors")
     law = _make(name, f"mu = {mu}" + (f", up to {at_rest} at rest" if at_rest else ""), expression, qualified=qualified)
-    describe(law, Traits(SetValued if at_rest else Smooth, coefficients=_coefficients(used, at_rest)))
+    describe(law, Traits(SetValued if at_rest else Smooth, coefficients=_coefficients_among(used, at_rest)))
     return law
 
 
-_DEFINITIONS = Definitions(__name__, _defined)
+_DEFINITIONS = Definitions(__name__, _law_by_formula)
 
 __getattr__ = _DEFINITIONS.find

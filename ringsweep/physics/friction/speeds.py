@@ -184,6 +184,7 @@ class _Finder:
         self.found: dict[Any, Any] = {}
 
     def fields(self) -> dict[str, NDArray[Any]]:
+        """Fields of the law that are found once for each cell, see :func:`hidden_fields`."""
         for threshold in self.expression.thresholds:
             speed = self._speed_of(threshold)
             for index, lower in threshold.within:
@@ -212,6 +213,7 @@ class _Finder:
         return np.broadcast_to(evaluate(node, speed, self.values, self.thresholds), self.rows)
 
     def _by_surface(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values as an array of shape ``(surfaces, cells)``."""
         return values.reshape(self.surfaces, -1)
 
     def _one_of_each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -220,14 +222,23 @@ class _Finder:
         return found
 
     def _enclosed(self, node: Node) -> Enclosure:
+        """Bounds on an expression over intervals of the speed."""
         return Enclosure(node, self.values, self.thresholds)
 
     def _cells(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> Cells:
+        """Intervals of the speed from `low` to `high`, divided at the thresholds that are known so far."""
         return cells_between(low, high, [speed for speed in self.thresholds if np.isfinite(speed).any()])
 
     # ---- switches -----------------------------------------------------------------------------
 
     def _speed_of(self, threshold: Threshold) -> NDArray[np.float64]:
+        """Speed of a threshold in each row, m/s.
+
+        Raises
+        ------
+        FormulaError
+            If rounding hides where the formula switches.
+        """
         if threshold.at is not None:
             return self._equal(self._given(threshold.at))
         assert threshold.difference is not None
@@ -249,18 +260,21 @@ class _Finder:
             raise self._undecided(what, error) from None
 
     def _once(self, key: Any, find: Any) -> Any:
+        """What `find` returns, found once for each key."""
         if key not in self.found:
             self.found[key] = find()
         return self.found[key]
 
     @staticmethod
     def _undecided(what: str, error: UndecidedError) -> FormulaError:
+        """Error that rounding hides `what`."""
         return FormulaError(
             f"{what} cannot be told from rounding at speeds from {error.low:.6g} to {error.high:.6g} m/s: write the "
             "formula so that nearly equal numbers are not subtracted, or with piecewise"
         )
 
     def _given(self, speed: Node) -> NDArray[np.float64]:
+        """Speed of a threshold that the formula states, m/s."""
         found = self.at(speed, self.rest)
         if np.isnan(found).any():
             raise FormulaError("the speed at which it switches is not a number")
@@ -325,6 +339,7 @@ class _Finder:
         return self._of_all(np.minimum(first, last), np.min), self._of_all(last, np.max)
 
     def _of_all(self, values: NDArray[np.float64], choose: Any) -> NDArray[np.float64]:
+        """One value for each cell, chosen among those on all its surfaces, and repeated for each surface."""
         return np.tile(choose(self._by_surface(values), axis=0), self.surfaces)
 
     # ---- validity -----------------------------------------------------------------------------
@@ -403,6 +418,7 @@ class _Finder:
     # ---- band and slopes ----------------------------------------------------------------------
 
     def _band(self) -> NDArray[np.float64]:
+        """Speed up to which friction rises, m/s: the stiction band of a smooth law."""
         if self.expression.band is not None:
             return self._one_of_each(self.at(self.expression.band, self.rest))
         cells = self._cells(self.rest, np.full(self.rows, np.inf))

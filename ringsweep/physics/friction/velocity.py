@@ -100,7 +100,8 @@ def _per_contact(expression: Expression, surfaces: int) -> list[Node]:
     ]
 
 
-def _names(expression: Expression, surfaces: int) -> dict[str, str]:
+def _source_names(expression: Expression, surfaces: int) -> dict[str, str]:
+    """Source text of each symbol of an expression: of parameters, pieces, and coefficients under each surface."""
     names = {name: f"law.{name}" for name in expression.parameters}
     if expression.tabulated:
         names |= {f"piece {j}": f"piece[{j}]" for j in range(PIECE)}
@@ -133,7 +134,8 @@ def _piece_at(pieces, speed):
 
 
 @lanes_body(_piece_at)
-def _lanes_piece_at(pieces, speed):
+def _piece_at_in_lanes(pieces, speed):
+    """Form of :func:`_piece_at` for vector lanes: each lane halves the rows by itself."""
     low, width = spread(0.0), pieces.shape[0]
     while width > 1:
         # The row is one of `width` rows from `low` on.
@@ -220,6 +222,7 @@ def _interval(expression: Expression) -> str:
 
 
 def _region_prelude(expression: Expression) -> list[str]:
+    """First lines of a function of the region: its lower bound, or the cubic of its piece."""
     if not expression.tabulated:
         return ["low = low_of(law, region)"]
     coefficients = "".join(f"law.pieces[i, {j}], " for j in range(PIECE))
@@ -227,6 +230,7 @@ def _region_prelude(expression: Expression) -> list[str]:
 
 
 def _speed_prelude(expression: Expression) -> list[str]:
+    """First lines of a function of the speed: the cubic of the piece that holds it, if there are pieces."""
     return ["piece = piece_at(law.pieces, speed)"] if expression.tabulated else []
 
 
@@ -288,9 +292,10 @@ def is_varying(law: Any) -> bool:
 # ---- values -----------------------------------------------------------------------------------
 
 
-def _values(expression: Expression, count: int) -> tuple[dict[str, str], list[Node]]:
+def _names_and_values(expression: Expression, count: int) -> tuple[dict[str, str], list[Node]]:
+    """Source names, and the expressions of friction under each contact, then of their slopes."""
     found = _per_contact(expression, count)
-    return _names(expression, count), [*found, *map(derivative, found)]
+    return _source_names(expression, count), [*found, *map(derivative, found)]
 
 
 @_derived
@@ -310,7 +315,7 @@ def friction_at(expression, count, lanes, law, speed, surfaces):
     tuple
         ``(mu, ..., slope, ...)``. In lanes a set-valued law has no friction at rest, where it has no single value.
     """
-    names, outputs = _values(expression, count)
+    names, outputs = _names_and_values(expression, count)
     if not lanes:
         return [*_speed_prelude(expression), *writer.float_lines(names, outputs, _SPEED_SIDE)]
     lines = [*_speed_prelude(expression), *writer.lanes_lines(names, outputs, "law.thresholds[{}]")]
@@ -325,7 +330,7 @@ def friction_at(expression, count, lanes, law, speed, surfaces):
 @_derived
 def friction_in(expression, count, lanes, law, region, speed, surfaces):
     """What :func:`friction_at` returns, by the formula of a region, even if the speed lies outside the region."""
-    return [*_region_prelude(expression), *writer.float_lines(*_values(expression, count), _REGION_SIDE)]
+    return [*_region_prelude(expression), *writer.float_lines(*_names_and_values(expression, count), _REGION_SIDE)]
 
 
 @inlined
@@ -375,8 +380,9 @@ def leaps(expression, count, lanes, law, slow, fast):
 
 
 @cache
-def _series(expression: Expression, count: int) -> writer.SeriesSource:
-    return writer.series_source(_names(expression, count), _per_contact(expression, count), _REGION_SIDE)
+def _source_of_series(expression: Expression, count: int) -> writer.SeriesSource:
+    """Source code of the power series of friction under each contact."""
+    return writer.series_source(_source_names(expression, count), _per_contact(expression, count), _REGION_SIDE)
 
 
 #: Largest number of products in the power series of a law: tables have places for that many besides those of a model.
@@ -385,13 +391,13 @@ MOST_PRODUCTS = MOST_GROUPS * PRODUCTS - 8
 
 def series_products(expression: Expression) -> int:
     """Number of products in the power series of friction at two contacts."""
-    return _series(expression, 4).products
+    return _source_of_series(expression, 4).products
 
 
 @_derived
 def no_products(expression, count, lanes, law, surfaces):
     """Tuple of zeros, one for each product in the power series of friction."""
-    return [f"return ({'0.0, ' * _series(expression, count).products})"]
+    return [f"return ({'0.0, ' * _source_of_series(expression, count).products})"]
 
 
 @_derived
@@ -413,7 +419,7 @@ def begin_series(expression, count, lanes, law, region, speed, surfaces):
         Friction coefficient at each contact; numbers for :func:`series_term`; and the sharpness of the law for
         :func:`shorten_for_decay`, s/m.
     """
-    return [*_region_prelude(expression), *_series(expression, count).start]
+    return [*_region_prelude(expression), *_source_of_series(expression, count).start]
 
 
 @_derived
@@ -438,7 +444,7 @@ def series_term(expression, count, lanes, law, region, k, x, inner, begun, surfa
     tuple of tuple of float
         Coefficient of friction at each contact; left factors and right factors of the products.
     """
-    return [*_region_prelude(expression), *_series(expression, count).step]
+    return [*_region_prelude(expression), *_source_of_series(expression, count).step]
 
 
 # Largest change of the exponent of an exponential within a step. For a larger change the terms still grow at the end of
