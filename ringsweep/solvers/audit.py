@@ -69,7 +69,8 @@ def _violation_in_series(family, scene, step, scratch, tolerance, fraction):
     return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
 
 
-def _violation_in_implicit(family, scene, step, scratch, tolerance, fraction):
+def _violation_in_implicit_step(family, scene, step, scratch, tolerance, fraction):
+    """Violation and power at a fraction of an implicit step, from its dense output."""
     (_, x), (_, x_next) = _ends(scene, step, scratch)
     forcing, bends = implicit.forcing(scene, scratch.course, step.now, fraction * step.s), scratch.bends[0]
     state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends, fraction))
@@ -84,13 +85,14 @@ def _energies_in_series(family, scene, step, scratch):
     return audit_of_model.energy(scene, before, step.y), audit_of_model.energy(scene, after, step.y_next)
 
 
-def _energies_in_implicit(family, scene, step, scratch):
+def _energies_in_implicit_step(family, scene, step, scratch):
+    """Energies at both ends of an implicit step, J."""
     (before, _), (after, _) = _ends(scene, step, scratch)
     return audit_of_model.energy(scene, before, step.y), audit_of_model.energy(scene, after, step.y_next)
 
 
-_violation = either(_violation_in_series, _violation_in_implicit)
-_energies = either(_energies_in_series, _energies_in_implicit)
+_violation = either(_violation_in_series, _violation_in_implicit_step)
+_energies = either(_energies_in_series, _energies_in_implicit_step)
 
 
 @inlined
@@ -132,7 +134,8 @@ def _fall_rate_in_series(family, scene, step, scratch, guard):
     return -slope(scratch.c[guard], step.s)
 
 
-def _fall_rate_in_implicit(family, scene, step, scratch, guard):
+def _fall_rate_in_implicit_step(family, scene, step, scratch, guard):
+    """Mean rate at which a guard fell in the last tenth of an implicit step."""
     (before, x), (_, x_next) = _ends(scene, step, scratch)
     late = implicit.forcing(scene, scratch.course, step.now, 0.9 * step.s)
     state = rosenbrock.dense(x, x_next, scratch.bends[0], 0.9)
@@ -140,4 +143,4 @@ def _fall_rate_in_implicit(family, scene, step, scratch, guard):
     return view[0][guard - scratch.first_guard] / (0.1 * step.s)
 
 
-fall_rate = either(_fall_rate_in_series, _fall_rate_in_implicit)
+fall_rate = either(_fall_rate_in_series, _fall_rate_in_implicit_step)

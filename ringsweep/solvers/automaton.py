@@ -115,7 +115,8 @@ def _creep(scene, run, h_max, tolerance, scratch):
 
 
 @_step.implements(SetValued)
-def _step_series(family, scene, run, h_max, tolerances, scratch):
+def _step_by_series(family, scene, run, h_max, tolerances, scratch):
+    """Implement :func:`_step`: by a series in each mode; the implicit control is passed through."""
     guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch)
     rate = 0.0
     if shared > 0.0 and modes.sticks(scene, run.mode):
@@ -134,7 +135,8 @@ def _goes_on(scene, run, guard, record):
 
 
 @_step.implements(Smooth)
-def _step_either(family, scene, run, h_max, tolerances, scratch):
+def _step_by_stiffness(family, scene, run, h_max, tolerances, scratch):
+    """Implement :func:`_step`: implicit in a stiff stiction band, by a series elsewhere."""
     # A mode relaxes fast in the stiction band alone.
     if run.mode.region < 0:
         is_stiff, guard, s, y, record, control, error = _creep(scene, run, h_max, tolerances[1], scratch)
@@ -148,7 +150,8 @@ def _step_either(family, scene, run, h_max, tolerances, scratch):
 
 
 @_step.implements(Dynamic)
-def _step_implicit(family, scene, run, h_max, tolerances, scratch):
+def _step_implicitly(family, scene, run, h_max, tolerances, scratch):
+    """Implement :func:`_step`: always implicit."""
     start = start_at(scene, scratch.course, run.mode, run.now, run.y)
     guard, s, y, record, control, error = implicit_step(
         scene, run.record, start, run.control, h_max, tolerances[1], scratch
@@ -163,7 +166,8 @@ def _step_in(kind, scene, run, h_max, tolerances, scratch):
 
 
 @_step_in.implements(simpler.Parted)
-def _step_in_part(kind, scene, run, h_max, tolerances, scratch):
+def _step_of_simpler_scene(kind, scene, run, h_max, tolerances, scratch):
+    """Implement :func:`_step_in`: the simpler scene takes the step in its modes."""
     if not simpler.is_simpler(scene, run.mode):
         return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
     part, record, y = simpler.part(scene, run.record, run.mode, run.y)
@@ -181,13 +185,15 @@ def _begin(family, scene, mode, now, y, tolerances, c):
 
 
 @_begin.implements(SetValued, Smooth)
-def _begin_series(family, scene, mode, now, y, tolerances, c):
+def _begin_by_series(family, scene, mode, now, y, tolerances, c):
+    """Implement :func:`_begin`."""
     series.expand(scene, mode, now, y, tolerances[0], c)
     return recorder.begin(scene, now.t, series.seen_at_start(scene, c))
 
 
 @_begin.implements(Dynamic)
-def _begin_implicit(family, scene, mode, now, y, tolerances, c):
+def _begin_implicitly(family, scene, mode, now, y, tolerances, c):
+    """Implement :func:`_begin`."""
     return recorder.begin(scene, now.t, _seen_in(scene, mode, drives.turn(scene.drive, now), y))
 
 
@@ -205,12 +211,13 @@ def _row_of_series(family, scene, step, c, s, y):
     return modes.row(scene, step.mode, forcing, series.state_at(scene, c, s), seen)
 
 
-def _row_of_state(family, scene, step, c, s, y):
+def _row_in_implicit_step(family, scene, step, c, s, y):
+    """Row of a history at the state `y` of a mode, `s` after the beginning of an implicit step."""
     forcing = drives.turn(scene.drive, later(step.now, s))
     return modes.row(scene, step.mode, forcing, y, _seen_in(scene, step.mode, forcing, y))
 
 
-_history_row = either(_row_of_series, _row_of_state)
+_history_row = either(_row_of_series, _row_in_implicit_step)
 
 
 @inlined
@@ -238,7 +245,8 @@ def _after_step(scene, mode, guard, now, s, limit, y):
 
 
 @inlined
-def _fill(row, values):
+def _copy_into(row, values):
+    """Copy a tuple of numbers into the first columns of a row."""
     for k in range(len(values)):
         row[k] = values[k]
 
@@ -266,7 +274,7 @@ def _store_row(scene, step, c, s, y, history, count):
     times = history.times
     if count == len(times):
         return count
-    _fill(history.table[count], _history_row(family(scene.law), scene, step, c, s, y))
+    _copy_into(history.table[count], _history_row(family(scene.law), scene, step, c, s, y))
     # Rounding must not make times decrease.
     t = later(step.now, s).t
     times[count] = max(t, times[count - 1]) if count > 0 else t
@@ -416,5 +424,5 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             audits[i, 0] = audit.violation
             audits[i, 1] = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
             audits[i, 2] = guard_fall_rate
-            _fill(audits[i, 3:], local)
+            _copy_into(audits[i, 3:], local)
     return count

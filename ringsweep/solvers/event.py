@@ -307,5 +307,6 @@ class Auto(Method):
         return self._method(structure.law_type)
 
     def _method(self, law: type) -> Method:
+        """Method for a law."""
         method = Event if family_of(law) is SetValued else Implicit
         return method(max_steps=self.max_steps, certify=self.certify)

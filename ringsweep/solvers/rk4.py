@@ -145,6 +145,7 @@ class RK4(Method):
     def _integrate(
         self, batch: Any, cells: NDArray[np.intp], steps: int, width: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rows of outcomes and reports of these cells with so many steps; see :class:`Results` for the columns."""
         results = Results(np.empty((len(batch.span), width)), np.empty((len(batch.span), 5)))
         diagnosed = Diagnosed() if self.diagnose else ()
         scenes, launches = prepare(batch)
