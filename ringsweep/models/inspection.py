@@ -95,7 +95,7 @@ def _sliding_velocity(scene, y, forcing):
 
 
 @absorbed
-def rates(scene, y, forcing, angle):
+def rates_in_space(scene, y, forcing, angle):
     """Time derivative of a state; the arguments are those of :func:`slip_in_space`."""
     now, _ = slip_in_space(scene, y, _sliding_velocity(scene, y, forcing), forcing, angle)
     acceleration = ring.acceleration(scene.body, *now.K, now.motion)[0]

@@ -106,7 +106,7 @@ def lent(asked, record, row, deflections):
 
 
 @feature("inf")
-def due(asked, record):
+def next_point(asked, record):
     """Time that a step must show the record, s; infinite if there is none."""
     return inf if asked.at_turn else record.cycles.next
 

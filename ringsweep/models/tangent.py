@@ -171,11 +171,11 @@ def _saltation(length, gradient, before, after, keeps):
         for j in range(length)
     )
     determinant = " + ".join(f"jump{i} * gradient[{i}]" for i in range(length))
-    return [*lines, f"size = keeps * abs(1.0 + {determinant})", "return (" + ", ".join(entries) + "), logarithm(size)"]
+    return [*lines, f"size = keeps * abs(1.0 + {determinant})", "return (" + ", ".join(entries) + "), log_size(size)"]
 
 
 @inlined
-def logarithm(x):
+def log_size(x):
     """Natural logarithm; that of 0 is minus infinity."""
     return log(x) if x > 0.0 else -inf
 
@@ -196,7 +196,7 @@ def _eigenvalues_of_two(matrix, log_determinant):
         size, angle = exp(0.5 * log_determinant), atan2(sqrt(-root), half)
         return size, size, 0.5 * log_determinant, 0.5 * log_determinant, angle, -angle
     first = abs(half) + sqrt(root)
-    log_1 = logarithm(first)
+    log_1 = log_size(first)
     log_2 = log_determinant - log_1 if first > 0.0 else -inf
     angle, second = _angle(half), exp(log_2)
     return first, second, log_1, log_2, angle, angle if second > 0.0 else 0.0
@@ -215,7 +215,7 @@ def _eigenvalues_of_three(matrix, log_determinant):
     minors = a * e - b * d + a * i - c * g + e * i - f * h
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     first, second, angle_1, angle_2 = _of_cubic(a + e + i, minors, determinant)
-    return first, second, logarithm(first), logarithm(second), angle_1, angle_2
+    return first, second, log_size(first), log_size(second), angle_1, angle_2
 
 
 @inlined
@@ -267,7 +267,7 @@ def enter(tangent, keeps, rates):
 
 @inlined
 def advance(tangent, h, rates, weights, work):
-    """Tangent after an interval; see :func:`ringsweep.models.interface.variation.advance`."""
+    """Tangent after an interval; see :func:`ringsweep.models.interface.variation.propagate`."""
     r = tangent
     step = r.step
     if r.keeps == 0.0 or _is_pending(r.gradient):
@@ -297,7 +297,7 @@ def observed(tangent, scene, before, cycles, t, duration):
     lap = Flow(_product(r.vector, r.step.matrix, r.lap.matrix), r.lap.log_determinant + r.step.log_determinant)
     vector = _applied(r.vector, r.step.matrix)
     length = _length(vector, scene.asked.frequency)
-    growth = r.growth + logarithm(length)
+    growth = r.growth + log_size(length)
     vector = _scaled(vector, 1.0 / length) if length > 0.0 else r.vector
     unit = Flow(_unit(vector), 0.0)
     multipliers = r.multipliers

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringsweep.compile import inlined
-from ringsweep.models.belt.force import breakaway_force, length_scale, moving, sliding, speed_scale
+from ringsweep.models.belt.force import breakaway_force, length_scale, moving, slip_from, speed_scale
 from ringsweep.models.interface import audit, implicit
 from ringsweep.models.sliding import audited, larger, of_balances, speed_in
 from ringsweep.models.slip import acceleration_slopes, slip
@@ -53,7 +53,7 @@ def _violation_on_belt(scene, mode, forcing, y, rates, s, tolerance):
         sizes = ring.size(body, (length, push, velocity)) + body.mass * (body.gravity + abs(forcing[2]))
         largest = (abs(friction) - breakaway_force(scene, x)) / (tolerance * sizes + 1e-300)
     else:
-        now = sliding(scene, x, velocity, v, forcing)
+        now = slip_from(scene, x, velocity, v, forcing)
         (K, _), motion = now.K, now.motion
         relaxation = abs(acceleration_slopes(scene, now)[1])
         # In a dead band the sliding velocity need not have the direction of the force.

@@ -10,7 +10,7 @@ from math import sqrt
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.belt.force import length_scale
-from ringsweep.models.belt.record import begin
+from ringsweep.models.belt.record import record_at_launch
 from ringsweep.models.belt.series import Mode
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
@@ -76,7 +76,7 @@ def _slip_on_bristle_belt(scene, y, v, forcing, angle):
 @recorder.begin.implements(BristleBelt)
 def _begin_record_on_bristle_belt(scene, t, seen):
     """Implement :func:`recorder.begin`, for the speed and the distance at which bristles yield."""
-    return begin(scene, t, seen, stick_speed(scene.law, recoil_speed(scene)), _play(scene))
+    return record_at_launch(scene, t, seen, stick_speed(scene.law, recoil_speed(scene)), _play(scene))
 
 
 @recorder.keep_memory.implements(BristleBelt)

@@ -30,7 +30,7 @@ def moving(scene, velocity, v, belt_velocity):
 
 
 @absorbed
-def sliding(scene, x, velocity, v, forcing):
+def slip_from(scene, x, velocity, v, forcing):
     """The :class:`Slip` of a body.
 
     Parameters

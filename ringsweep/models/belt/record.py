@@ -187,7 +187,7 @@ _ROUNDING = 1e-6
 
 
 @inlined
-def begin(scene, t, seen, band, play):
+def record_at_launch(scene, t, seen, band, play):
     """Record at the beginning of a run."""
     x, velocity, force, place, v, v_rate, acceleration, _ = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
@@ -439,7 +439,7 @@ def _conclude_on_belt(scene, record, status, t, place, velocity):
         0.0 if long_run in (TRANSIENT, UNBOUNDED) else 1.0,
         float(long_run),
         r.force_max,
-        *shock.largest(r.shocks),
+        *shock.largest_jump(r.shocks),
     )
     return tangent.with_exponent(r.tangent, outcome, period, scene)
 
@@ -566,7 +566,7 @@ def _without_return(parts, scene, r):
 @recorder.begin.implements(Belt)
 def _begin_record_on_belt(scene, t, seen):
     """Implement :func:`recorder.begin`, for the stiction band of the law."""
-    return begin(scene, t, seen, stiction_band(scene.law), -1.0)
+    return record_at_launch(scene, t, seen, stiction_band(scene.law), -1.0)
 
 
 @recorder.after_event.implements(Belt)
@@ -579,4 +579,4 @@ def _after_event_on_belt(scene, record, before, mode, t):
 def _enter_record_on_belt(scene, record, t, seen):
     """Implement :func:`recorder.enter`: extremes of friction, and jumps of the acceleration."""
     # Friction may jump at an event, and both limits count.
-    return _entered(record, max(record.force_max, abs(seen[2])), shock.enter(record.shocks, t, seen[6]))
+    return _entered(record, max(record.force_max, abs(seen[2])), shock.with_jump(record.shocks, t, seen[6]))

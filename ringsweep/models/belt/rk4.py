@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import nan
 
 from ringsweep.models.belt.creep import deflection
-from ringsweep.models.belt.force import moving, sliding
-from ringsweep.models.inspection import inspection, rates, slip_in_space, word_of_mode
+from ringsweep.models.belt.force import moving, slip_from
+from ringsweep.models.inspection import inspection, rates_in_space, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
 from ringsweep.physics import drives
 from ringsweep.physics.belt import Belt, BristleBelt
@@ -21,13 +21,13 @@ def _initial_state_on_belt(scene):
 @slip_in_space.implements(Belt)
 def _slip_in_space_on_belt(scene, y, v, forcing, angle):
     """Implement :func:`slip_in_space`; nothing is added to the slip."""
-    return sliding(scene, y[0], moving(scene, y[1], v, forcing[1]), v, forcing), ()
+    return slip_from(scene, y[0], moving(scene, y[1], v, forcing[1]), v, forcing), ()
 
 
 @constant_step.rates.implements(Belt, BristleBelt)
 def _rates_in_constant_step_on_belt(scene, now, y, forcing):
     """Implement :func:`constant_step.rates`."""
-    return rates(scene, y, forcing, ())
+    return rates_in_space(scene, y, forcing, ())
 
 
 @constant_step.inspect.implements(Belt, BristleBelt)

@@ -22,7 +22,7 @@ _SMALL = 1e-4
 @variation.due.implements(Belt, BristleBelt)
 def _due_on_belt(scene, record):
     """Implement :func:`variation.due`: the end of the cycle, or the next point of the section."""
-    return min(_end_of_cycle(scene.asked, record), section.due(scene.section, record))
+    return min(_end_of_cycle(scene.asked, record), section.next_point(scene.section, record))
 
 
 @feature("inf")
@@ -31,29 +31,29 @@ def _end_of_cycle(asked, record):
     return record.cycles.next
 
 
-@variation.enter.implements(Belt)
+@variation.enter_mode.implements(Belt)
 def _enter_tangent_on_belt(scene, record, mode, rates):
-    """Implement :func:`variation.enter`; stick keeps no disturbance of the sliding velocity."""
+    """Implement :func:`variation.enter_mode`; stick keeps no disturbance of the sliding velocity."""
     # A body stays in a dead band at any velocity in it; only one that comes from outside has that of the edge.
     arrives = stiction_band(scene.law) == 0.0 or record.tangent.gradient[1] != 0.0
     return with_tangent(record, tangent.enter(record.tangent, 0.0 if mode.sign == 0 and arrives else 1.0, rates))
 
 
-@variation.enter.implements(BristleBelt)
+@variation.enter_mode.implements(BristleBelt)
 def _enter_tangent_on_bristle_belt(scene, record, mode, rates):
-    """Implement :func:`variation.enter`; bristles keep all disturbances."""
+    """Implement :func:`variation.enter_mode`; bristles keep all disturbances."""
     return with_tangent(record, tangent.enter(record.tangent, 1.0, rates))
 
 
-@variation.advance.implements(Belt, BristleBelt)
+@variation.propagate.implements(Belt, BristleBelt)
 def _advance_tangent_on_belt(scene, record, h, rates, weights, work):
-    """Implement :func:`variation.advance`."""
+    """Implement :func:`variation.propagate`."""
     return with_tangent(record, tangent.advance(record.tangent, h, rates, weights, work))
 
 
-@variation.switched.implements(Belt, BristleBelt)
+@variation.apply_saltation.implements(Belt, BristleBelt)
 def _switch_tangent_on_belt(scene, record, mode, guard, t, y):
-    """Implement :func:`variation.switched`."""
+    """Implement :func:`variation.apply_saltation`."""
     rates = record.tangent.rates
     return with_tangent(record, tangent.switched(record.tangent, _gradient(scene, mode, guard, t, y, rates)))
 

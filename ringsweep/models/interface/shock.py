@@ -59,7 +59,7 @@ def without_event(shocks, seen):
 
 
 @inlined
-def enter(shocks, t, seen):
+def with_jump(shocks, t, seen):
     """Shocks at the beginning of a step at time `t`, where the acceleration may have jumped."""
     jump = abs(seen.acceleration - shocks.acceleration)
     if jump > shocks.jump_max and jump > _LEAST_SHARE * seen.size:
@@ -76,6 +76,6 @@ def without_jump(law_family, shocks):
 
 
 @feature("(nan, nan)")
-def largest(shocks):
+def largest_jump(shocks):
     """Largest jump and its time, s; NaN where it is not known."""
     return shocks.jump_max, shocks.t_jump_max

@@ -74,12 +74,12 @@ def jacobian(scene, mode, t, y):
 
 
 @hook
-def enter(scene, record, mode, rates):
+def enter_mode(scene, record, mode, rates):
     """Record at the beginning of a step in a mode, where the rates of the state are `rates`."""
 
 
 @hook
-def advance(scene, record, h, rates, weights, work):
+def propagate(scene, record, h, rates, weights, work):
     """Record after an interval of length `h` within a step.
 
     Parameters
@@ -95,5 +95,5 @@ def advance(scene, record, h, rates, weights, work):
 
 
 @hook
-def switched(scene, record, mode, guard, t, y):
+def apply_saltation(scene, record, mode, guard, t, y):
     """Record after a guard of a mode has vanished; the arguments are those of :func:`modes.switch`."""

@@ -13,7 +13,7 @@ from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.ring.contacts import coefficients_under, edges_ahead
-from ringsweep.models.ring.record import sought
+from ringsweep.models.ring.record import extremes_of
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.numerics.functions import ROTATED, rotated, sine_cosine_from
 from ringsweep.numerics.terms import joined
@@ -124,4 +124,4 @@ def _seen_in_implicit_step_on_ring(scene, view):
 def _sought_on_ring(scene, record, view):
     """Implement :func:`implicit.sought`: phi, omega, both reactions."""
     guards, motion = view
-    return sought(record, motion[0], motion[1], guards[NORMAL_1], guards[NORMAL_2])
+    return extremes_of(record, motion[0], motion[1], guards[NORMAL_1], guards[NORMAL_2])

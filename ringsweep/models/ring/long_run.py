@@ -79,14 +79,14 @@ def with_room(long_run, scene, row):
 
 
 @feature("inf")
-def due(long_run):
+def next_cycle_end(long_run):
     """Time that a step must show the record, s; infinite if there is none."""
     return long_run.cycles.next
 
 
 @feature("inf")
 def rest(long_run):
-    """Time from the last observation to :func:`due`, s; infinite if there is none."""
+    """Time from the last observation to :func:`next_cycle_end`, s; infinite if there is none."""
     return long_run.cycles.next - long_run.last.t
 
 
@@ -143,4 +143,4 @@ def followed(long_run, outcome, scene, status):
 @variation.due.implements(Ring, BristleRing)
 def _due_on_ring(scene, record):
     """Implement :func:`variation.due`: the end of the cycle of the drive."""
-    return due(record.long_run)
+    return next_cycle_end(record.long_run)

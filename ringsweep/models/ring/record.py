@@ -84,7 +84,7 @@ class Outcome(NamedTuple):
 
 
 @inlined
-def begin(seen, epsilon_omega):
+def record_at_launch(seen, epsilon_omega):
     """Record at the beginning of a run."""
     phi, omega, normal_1, normal_2, acceleration = seen[0], seen[1], seen[2], seen[3], seen[4]
     sense = 1.0 if omega > epsilon_omega else -1.0 if omega < -epsilon_omega else 0.0
@@ -93,7 +93,7 @@ def begin(seen, epsilon_omega):
 
 
 @inlined
-def observe(record, shocks, stuck_for, seen, epsilon_omega):
+def record_after(record, shocks, stuck_for, seen, epsilon_omega):
     """Record after one more state; `stuck_for` is the time for which the body has stuck since the last state, s.
 
     At a reversal the angular velocity passes from beyond one threshold to beyond the other, so that chatter about zero
@@ -130,7 +130,7 @@ def observe(record, shocks, stuck_for, seen, epsilon_omega):
 
 
 @inlined
-def sought(record, phi, omega, normal_1, normal_2):
+def extremes_of(record, phi, omega, normal_1, normal_2):
     """What :func:`ringsweep.models.interface.implicit.sought` returns for these values."""
     r = record
     return (
@@ -148,15 +148,15 @@ def turns_of(record):
 
 
 @inlined
-def motion_of(record):
+def word_of_motion(record):
     """Motion up to now."""
     return REVOLVING if turns_of(record) >= 1 else OSCILLATORY if record.reversals > 0 else RESTING
 
 
 @inlined
-def conclude(record, status, t, phi, omega):
+def outcome_of(record, status, t, phi, omega):
     """Outcome of a run that ended with `status` at time `t` in the state `(phi, omega)`."""
-    r, motion = record, motion_of(record)
+    r, motion = record, word_of_motion(record)
     if status == BROKEN or not (isfinite(phi + omega) and isfinite(r.normal_min_1 + r.normal_min_2)):
         regime, motion = FAILED, FAILED
     elif status == JAM:
@@ -187,7 +187,7 @@ def conclude(record, status, t, phi, omega):
         # A contact that is lost at launch has had no reaction.
         max(r.normal_max_1, 0.0),
         max(r.normal_max_2, 0.0),
-        *shock.largest(r.shocks),
+        *shock.largest_jump(r.shocks),
     )
 
 
@@ -201,7 +201,7 @@ with_long_run, _with_shocks = replacing("long_run"), replacing("shocks")
 @recorder.begin.implements(Ring, BristleRing)
 def _begin_record_on_ring(scene, t, seen):
     """Implement :func:`recorder.begin`; the record of a long run stays empty unless the scene asks for one."""
-    begun = begin(seen, scene.epsilon_omega)
+    begun = record_at_launch(seen, scene.epsilon_omega)
     return with_long_run(begun, long_run.launched(scene.long_run, scene, t, seen))
 
 
@@ -219,14 +219,14 @@ def _observe_on_ring(scene, record, t, duration, stuck, seen):
     bristles (m) if there are any.
     """
     shocks = shock.without_event(record.shocks, seen[4])
-    r = observe(record, shocks, select(stuck, duration, 0.0), seen, scene.epsilon_omega)
+    r = record_after(record, shocks, select(stuck, duration, 0.0), seen, scene.epsilon_omega)
     return with_long_run(r, long_run.continued(r.long_run, scene, r.stick_time, t, duration, seen))
 
 
 @recorder.enter.implements(Ring, BristleRing)
 def _enter_record_on_ring(scene, record, t, seen):
     """Implement :func:`recorder.enter`: an instant without duration, at which the acceleration may have jumped."""
-    return observe(record, shock.enter(record.shocks, t, seen[4]), 0.0, seen, scene.epsilon_omega)
+    return record_after(record, shock.with_jump(record.shocks, t, seen[4]), 0.0, seen, scene.epsilon_omega)
 
 
 @recorder.after_event.implements(Ring)
@@ -240,5 +240,5 @@ def _after_event_on_ring(scene, record, before, mode, t):
 @recorder.conclude.implements(Ring, BristleRing)
 def _conclude_on_ring(scene, record, status, t, place, velocity):
     """Implement :func:`recorder.conclude`: the numbers of :class:`Outcome`, and those of a long run if there is one."""
-    outcome = conclude(record, status, t, place, velocity)
+    outcome = outcome_of(record, status, t, place, velocity)
     return long_run.followed(record.long_run, outcome, scene, status)

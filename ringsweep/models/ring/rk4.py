@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ringsweep.models.inspection import inspection, rates, slip_in_space, word_of_mode
+from ringsweep.models.inspection import inspection, rates_in_space, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
 from ringsweep.models.ring.contacts import places_at, zones_of
 from ringsweep.models.slip import Slip
@@ -29,7 +29,7 @@ def _slip_in_space_on_ring(scene, y, v, forcing, angle):
 @constant_step.rates.implements(Ring, BristleRing)
 def _rates_in_constant_step_on_ring(scene, now, y, forcing):
     """Implement :func:`constant_step.rates`; sine and cosine start from those at the beginning of the step."""
-    return rates(scene, y, forcing, sine_cosine_carried(y[0], now.place, now.motion[0], now.motion[1], False))
+    return rates_in_space(scene, y, forcing, sine_cosine_carried(y[0], now.place, now.motion[0], now.motion[1], False))
 
 
 @constant_step.inspect.implements(Ring, BristleRing)

@@ -25,23 +25,23 @@ def _with(record, new):
     return with_long_run(record, with_tangent(record.long_run, new))
 
 
-@variation.enter.implements(Ring)
+@variation.enter_mode.implements(Ring)
 def _enter_tangent_on_ring(scene, record, mode, rates):
-    """Implement :func:`variation.enter`; stick keeps no disturbance of the sliding velocity."""
+    """Implement :func:`variation.enter_mode`; stick keeps no disturbance of the sliding velocity."""
     # A body that comes to rest on the ring keeps no disturbance of the sliding velocity.
     keeps = 0.0 if mode.sign == 0 and stiction_band(scene.law) == 0.0 else 1.0
     return _with(record, tangent.enter(record.long_run.tangent, keeps, rates))
 
 
-@variation.advance.implements(Ring)
+@variation.propagate.implements(Ring)
 def _advance_tangent_on_ring(scene, record, h, rates, weights, work):
-    """Implement :func:`variation.advance`."""
+    """Implement :func:`variation.propagate`."""
     return _with(record, tangent.advance(record.long_run.tangent, h, rates, weights, work))
 
 
-@variation.switched.implements(Ring)
+@variation.apply_saltation.implements(Ring)
 def _switch_tangent_on_ring(scene, record, mode, guard, t, y):
-    """Implement :func:`variation.switched`."""
+    """Implement :func:`variation.apply_saltation`."""
     before = record.long_run.tangent
     return _with(record, tangent.switched(before, _gradient(scene, mode, guard, t, y, before.rates)))
 

@@ -21,7 +21,7 @@ from ringsweep.models.ring.impact.mode import (
     place_of,
     ring_of,
 )
-from ringsweep.models.ring.record import sought
+from ringsweep.models.ring.record import extremes_of
 from ringsweep.models.sliding import rate_at_rest
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import drives, pivot
@@ -196,4 +196,4 @@ def _sought_with_impact(scene, record, view):
     """Implement :func:`implicit.sought`: as on the ring, and both gaps."""
     psi, psi_dot, normal_1, normal_2, _, gap_1, gap_2, _ = view[1][3]
     most = record.gap_max
-    return (*sought(record.base, psi, psi_dot, normal_1, normal_2), (gap_1, 0.0, most), (gap_2, 0.0, most))
+    return (*extremes_of(record.base, psi, psi_dot, normal_1, normal_2), (gap_1, 0.0, most), (gap_2, 0.0, most))

@@ -102,7 +102,7 @@ def begun(scene, t, y, stick, stick_end):
 
 
 @inlined
-def acceleration(scene, mode, t, y):
+def solution(scene, mode, t, y):
     """Solution in the slip or in the stick of a mode."""
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     f = frame(scene, y, ring_omega)

@@ -146,7 +146,7 @@ def _after_event_with_impact(scene, record, before, mode, t):
         turned,
         t if is_first else r.t_first,
         lost if is_first else r.first,
-        float(of_ring.motion_of(record.base)) if is_first else r.motion,
+        float(of_ring.word_of_motion(record.base)) if is_first else r.motion,
         float(event.number),
         (r.word * 512.0 + code * _BASE) % _PRIME,
         max(r.violation, event.violation),

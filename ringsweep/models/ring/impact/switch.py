@@ -501,7 +501,7 @@ def _falls(scene, mode, t, y, motion, contact):
         return -free_gap_acceleration(balls, contact, motion, scene.closed.body.gravity)
     if mode.contacts.open != contact:
         return 0.0
-    psi_dd, alpha_dd, _, _ = pivot.acceleration(scene, mode, t, y)
+    psi_dd, alpha_dd, _, _ = pivot.solution(scene, mode, t, y)
     # The measure of this gap is arm*sin(delta) plus a constant. At a gap of zero both have the same rate.
     delta = delta_when_closed(scene, holding(mode), mode.contacts.turned)
     arm = 2.0 * side_of(holding(mode)) * balls.half_distance
