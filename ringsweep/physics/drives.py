@@ -154,7 +154,7 @@ def amplitude(drive):
 
 
 @hook(absorb=True, optional=True)
-def known_to(drive, t):
+def time_for(drive, t):
     """The time, s, as the functions of a drive take it.
 
     By default a number, where `t` may be an :class:`ringsweep.numerics.clock.Instant`; a table and a formula take both.
@@ -179,7 +179,7 @@ def turn(drive, t):
     tuple of float
         ``(theta, omega, epsilon)``, rad, rad/s, rad/s^2; on the belt m, m/s, m/s^2.
     """
-    theta, omega, epsilon = shape(drive, known_to(drive, t))
+    theta, omega, epsilon = shape(drive, time_for(drive, t))
     a = amplitude(drive)
     # With an amplitude of zero the ring rests, even if the shape has an infinite acceleration.
     return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
@@ -252,9 +252,9 @@ def _expand_power(drive, t, order, theta, work):
         theta[k] = theta[k - 1] * (n - k + 1.0) / (k * t)
 
 
-@known_to.implements(Table)
+@time_for.implements(Table)
 def _instant_itself(drive, t):
-    """Implement :func:`known_to`: the place in a table or a period is found from the whole, exact time."""
+    """Implement :func:`time_for`: the place in a table or a period is found from the whole, exact time."""
     return t
 
 
@@ -269,7 +269,7 @@ def _expand_table(drive, t, order, theta, work):
 @inlined
 def expand_at(drive, t, order, theta, work):
     """What :func:`expand` does, about a time `t` that is a number or an :class:`ringsweep.numerics.clock.Instant`."""
-    expand(drive, known_to(drive, t), order, theta, work)
+    expand(drive, time_for(drive, t), order, theta, work)
 
 
 @hook(optional=True)
@@ -326,7 +326,7 @@ def jerk(drive, t):
 @inlined
 def jerk_at(drive, t):
     """What :func:`jerk` returns, at a time `t` that is a number or an :class:`ringsweep.numerics.clock.Instant`."""
-    return jerk(drive, known_to(drive, t))
+    return jerk(drive, time_for(drive, t))
 
 
 @jerk.implements(Power)
@@ -634,7 +634,7 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
     implement(jerk, "drive, t", [*_TIME, *number(derivative(second), "amplitude(drive) * ")])
     series = writer.taylor_lines(names, s, rate, _SIDE, "amplitude(drive)")
     implement(expand, "drive, t, order, theta, work", [*_TIME, *series])
-    known_to.implements(drive)(_instant_itself)
+    time_for.implements(drive)(_instant_itself)
     implement(top_speed, "drive", ["now = rest = 0.0", *number(size_at_start(function.rate))])
     # The drives of the package have no narrow features.
     reach = writer.reach_lines(names, s, _SIDE) if qualified else []

@@ -160,9 +160,9 @@ def _expand_motion_of_forced(drive, t, order, theta, work):
     drives.expand_at(drive.motion, t, order, theta, work)
 
 
-@drives.known_to.implements(Forced)
-def _known_to_forced(drive, t):
-    """Implement :func:`drives.known_to`: each of the two converts the time for itself."""
+@drives.time_for.implements(Forced)
+def _time_for_forced(drive, t):
+    """Implement :func:`drives.time_for`: each of the two converts the time for itself."""
     # Of the motion and of the force each may take another kind of time.
     return t
 
