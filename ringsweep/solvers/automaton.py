@@ -78,7 +78,7 @@ class Run(NamedTuple):
 
 
 @hook(absorb=True)
-def _step(family, scene, run, h_max, tolerances, scratch):
+def _step_of_family(family, scene, run, h_max, tolerances, scratch):
     """One step of the kind that the family of the friction law needs.
 
     Parameters
@@ -102,8 +102,11 @@ def _step(family, scene, run, h_max, tolerances, scratch):
 
 
 @inlined
-def _creep(scene, run, h_max, tolerance, scratch):
-    """Whether a mode is stiff, and the result of :func:`implicit_step` if it is; arguments as for :func:`_step`."""
+def _step_if_stiff(scene, run, h_max, tolerance, scratch):
+    """Whether a mode is stiff, and what :func:`implicit_step` returns if it is.
+
+    The arguments are those of :func:`_step_of_family`; `tolerance` is that of implicit steps.
+    """
     start, control = start_at(scene, scratch.course, run.mode, run.now, run.y), run.control
     if not implicit.is_stiff(scene, run.mode, run.y, start.linear):
         return False, -1, 0.0, run.y, run.record, control, 0.0
@@ -114,9 +117,9 @@ def _creep(scene, run, h_max, tolerance, scratch):
     return True, guard, s, y, record, control, error
 
 
-@_step.implements(SetValued)
+@_step_of_family.implements(SetValued)
 def _step_by_series(family, scene, run, h_max, tolerances, scratch):
-    """Implement :func:`_step`: by a series in each mode; the implicit control is passed through."""
+    """Implement :func:`_step_of_family`: by a series in each mode; the implicit control is passed through."""
     guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch)
     rate = 0.0
     if shared > 0.0 and modes.sticks(scene, run.mode):
@@ -134,12 +137,12 @@ def _goes_on(scene, run, guard, record):
     return recorder.after_event(scene, record, run.mode, run.mode, run.now.t) if guard < 0 else record
 
 
-@_step.implements(Smooth)
+@_step_of_family.implements(Smooth)
 def _step_by_stiffness(family, scene, run, h_max, tolerances, scratch):
-    """Implement :func:`_step`: implicit in a stiff stiction band, by a series elsewhere."""
+    """Implement :func:`_step_of_family`: implicit in a stiff stiction band, by a series elsewhere."""
     # A mode relaxes fast in the stiction band alone.
     if run.mode.region < 0:
-        is_stiff, guard, s, y, record, control, error = _creep(scene, run, h_max, tolerances[1], scratch)
+        is_stiff, guard, s, y, record, control, error = _step_if_stiff(scene, run, h_max, tolerances[1], scratch)
         if is_stiff:
             record = _goes_on(scene, run, guard, record)
             return True, guard, s, y, record, control, _after_creep(run.local, error)
@@ -149,9 +152,9 @@ def _step_by_stiffness(family, scene, run, h_max, tolerances, scratch):
     return False, guard, s, y, record, start_control(scene), local
 
 
-@_step.implements(Dynamic)
+@_step_of_family.implements(Dynamic)
 def _step_implicitly(family, scene, run, h_max, tolerances, scratch):
-    """Implement :func:`_step`: always implicit."""
+    """Implement :func:`_step_of_family`: always implicit."""
     start = start_at(scene, scratch.course, run.mode, run.now, run.y)
     guard, s, y, record, control, error = implicit_step(
         scene, run.record, start, run.control, h_max, tolerances[1], scratch
@@ -161,18 +164,18 @@ def _step_implicitly(family, scene, run, h_max, tolerances, scratch):
 
 @hook(absorb=True, optional=True)
 def _step_in(kind, scene, run, h_max, tolerances, scratch):
-    """One step of a scene, or of the simpler scene whose mode it is in; arguments and result as for :func:`_step`."""
-    return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
+    """One step of a scene, or of the simpler scene whose mode it is in; see :func:`_step_of_family`."""
+    return _step_of_family(family(scene.law), scene, run, h_max, tolerances, scratch)
 
 
 @_step_in.implements(simpler.Parted)
 def _step_of_simpler_scene(kind, scene, run, h_max, tolerances, scratch):
     """Implement :func:`_step_in`: the simpler scene takes the step in its modes."""
     if not simpler.is_simpler(scene, run.mode):
-        return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
+        return _step_of_family(family(scene.law), scene, run, h_max, tolerances, scratch)
     part, record, y = simpler.part(scene, run.record, run.mode, run.y)
     run_of_part = Run(record, run.mode, run.now, y, run.control, run.local, run.has_switched)
-    is_implicit, guard, s, y, record, control, local = _step(
+    is_implicit, guard, s, y, record, control, local = _step_of_family(
         family(scene.law), part, run_of_part, h_max, tolerances, scratch
     )
     record, y = simpler.rejoined(scene, run.record, run.mode, record, y, scratch.c)
@@ -180,20 +183,20 @@ def _step_of_simpler_scene(kind, scene, run, h_max, tolerances, scratch):
 
 
 @hook
-def _begin(family, scene, mode, now, y, tolerances, c):
+def _begin_record(family, scene, mode, now, y, tolerances, c):
     """Record at the beginning of a run."""
 
 
-@_begin.implements(SetValued, Smooth)
+@_begin_record.implements(SetValued, Smooth)
 def _begin_by_series(family, scene, mode, now, y, tolerances, c):
-    """Implement :func:`_begin`."""
+    """Implement :func:`_begin_record`."""
     series.expand(scene, mode, now, y, tolerances[0], c)
     return recorder.begin(scene, now.t, series.seen_at_start(scene, c))
 
 
-@_begin.implements(Dynamic)
+@_begin_record.implements(Dynamic)
 def _begin_implicitly(family, scene, mode, now, y, tolerances, c):
-    """Implement :func:`_begin`."""
+    """Implement :func:`_begin_record`."""
     return recorder.begin(scene, now.t, _seen_in(scene, mode, drives.turn(scene.drive, now), y))
 
 
@@ -348,7 +351,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         drives.new_course(scratch.course)
         t, y, status, mode = modes.begin(scene)
         now = Instant(t, 0.0)
-        begun = _begin(family(scene.law), scene, mode, now, y, tolerances, c)
+        begun = _begin_record(family(scene.law), scene, mode, now, y, tolerances, c)
         record = recorder.lend(scene, begun, take(rows, i))
         record = recorder.after_event(scene, record, mode, mode, t)
         control = start_control(scene)

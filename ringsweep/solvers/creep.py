@@ -83,7 +83,7 @@ def _view_within(scene, start, scratch, taken, fraction):
 
 
 @inlined
-def _step(scene, start, course, h, end, bends):
+def _step_of_method(scene, start, course, h, end, bends):
     """State after a step of the method, and the estimate of its error; see :func:`rosenbrock.step`.
 
     `end` is the forcing at the end.
@@ -104,7 +104,7 @@ def _step(scene, start, course, h, end, bends):
 def _guard_after(scene, start, scratch, h, g):
     """Value of guard `g` after a step of length `h`."""
     end = implicit.forcing(scene, scratch.course, start.now, h)
-    x_next, _ = _step(scene, start, scratch.course, h, end, scratch.bends[1])
+    x_next, _ = _step_of_method(scene, start, scratch.course, h, end, scratch.bends[1])
     return implicit.guards_and_motion(scene, start.mode, start.common, end, x_next)[0][g]
 
 
@@ -179,7 +179,7 @@ def _may_vanish(near_zero, first, middle, last):
 
 
 @inlined
-def _first_event(scene, start, scratch, taken, views):
+def _first_event_by_samples(scene, start, scratch, taken, views):
     """First guard to fall below zero within an implicit step, and the length of the step up to it.
 
     If none does: -1, and the length of the whole step.
@@ -330,7 +330,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     before = implicit.guards_and_motion(scene, mode, common, forcing, x)
     for _ in range(400):
         end = implicit.forcing(scene, course, now, h)
-        x_next, error = _step(scene, start, course, h, end, bends)
+        x_next, error = _step_of_method(scene, start, course, h, end, bends)
         h_norm = _error_norm(error, scales, linear)
         if not h_norm <= 1.0:
             # The step up to an event has stages of its own and may have a larger error.
@@ -347,7 +347,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])
         if not near:
             break
-        event, h = _first_event(scene, start, scratch, taken, (before, middle, after))
+        event, h = _first_event_by_samples(scene, start, scratch, taken, (before, middle, after))
         if event < 0 or h == 0.0:
             break
         near = False
@@ -361,7 +361,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             return event, 0.0, y, record, control, 0.0
     fractions = scratch.work[0]
     record = recorder.enter(scene, record, now.t, implicit.seen(scene, before))
-    count, looks = _extremes(scene, record, start, scratch, taken, (before, middle, after))
+    count, looks = _add_extremes(scene, record, start, scratch, taken, (before, middle, after))
     if looks or near:
         for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
             fractions[count] = i / INSTANTS
@@ -381,7 +381,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         if looks and fraction != 1.0 and _sets_record(scene, record, (before, view, after)):
             # A step of the method is more exact than the dense output, whose error may be that of the whole step.
             there = implicit.forcing(scene, course, now, fraction * h)
-            state, _ = _step(scene, start, course, fraction * h, there, scratch.bends[1])
+            state, _ = _step_of_method(scene, start, course, fraction * h, there, scratch.bends[1])
             view = implicit.guards_and_motion(scene, mode, common, there, state)
         duration = (fraction - fraction_before) * h
         ends = fraction_before, fraction
@@ -407,7 +407,7 @@ def _may_turn(first, middle, last):
 
 
 @inlined
-def _extremes(scene, record, start, scratch, taken, views):
+def _add_extremes(scene, record, start, scratch, taken, views):
     """Store in ``work[0]`` the fractions of a step at which place, velocity or a force may set a record.
 
     A quantity is taken as the polynomial through its values at five instants. Its value at an extreme does not depend

@@ -218,7 +218,7 @@ class _Buffers(NamedTuple):
     Attributes
     ----------
     table : ndarray
-        Shape of the drive and its rate, at whole and half steps; see :func:`_fill`.
+        Shape of the drive and its rate, at whole and half steps; see :func:`_fill_table`.
     memory : ndarray of shape ``(blocks of runs, numbers of a scene and a run, WIDTH)``
         Runs side by side.
     occupants : ndarray of int
@@ -271,7 +271,7 @@ class _End(NamedTuple):
 
 
 @inlined
-def _fill(table, drive, first, steps, h):
+def _fill_table(table, drive, first, steps, h):
     """Fill `table` with the shape of the drive and its rate, at whole and half steps from step `first` on."""
     for k in range(2 * steps + 1):
         row = table_row(drive, (first + 0.5 * k) * h)
@@ -281,12 +281,12 @@ def _fill(table, drive, first, steps, h):
 
 @kernel
 def _tabulate(table, drive, stretch):
-    """Fill `table` for all runs; see :func:`_fill`."""
-    _fill(table, drive, stretch.first, stretch.steps, stretch.h)
+    """Fill `table` for all runs; see :func:`_fill_table`."""
+    _fill_table(table, drive, stretch.first, stretch.steps, stretch.h)
 
 
 @absorbed
-def _step(scene, y, now, table, k, h):
+def _step_by_rk4(scene, y, now, table, k, h):
     """State one step after `y`, whose inspection is `now`; row `k` of `table` is the drive at the beginning."""
     k1 = now.rates
     forcing = lookup(scene.drive, table, k + 1)
@@ -314,7 +314,7 @@ def _step_to_end(scene, y, now, table, k, h):
 
     The inspection is that at the end of the whole step.
     """
-    y_next = _step(scene, y, now, table, k, h)
+    y_next = _step_by_rk4(scene, y, now, table, k, h)
     after = constant_step.inspect(scene, y_next, lookup(scene.drive, table, k + 2))
     status, fraction = constant_step.verdict(scene, now, after)
     if status != RUNNING:
@@ -323,7 +323,7 @@ def _step_to_end(scene, y, now, table, k, h):
 
 
 @inlined
-def _advance(diagnosed, batch, block, table, stretch, k):
+def _advance_lanes(diagnosed, batch, block, table, stretch, k):
     """Advance runs side by side from step `k` to the end of a stretch, or to a step in which a run ends.
 
     Returns the index of the first step that was not taken.
@@ -334,7 +334,7 @@ def _advance(diagnosed, batch, block, table, stretch, k):
     scene = read_lanes(block.memory, block.at, one)
     y, now, record, diagnosis, live = read_lanes(block.memory, runs_at, block.sample)
     while k < steps:
-        y_next = _step(scene, y, now, table, 2 * k, h)
+        y_next = _step_by_rk4(scene, y, now, table, 2 * k, h)
         forcing = lookup(scene.drive, table, 2 * k + 2)
         afresh = (first + k + 1) % _CARRIED == 0
         after = conform(constant_step.inspect_next(scene, now, y_next, forcing, afresh), now)
@@ -374,14 +374,14 @@ def _finish_ended(diagnosed, batch, block, table, stretch, k, results):
                 # The margin does not cover the contact that separates in this step.
                 diagnosis = Diagnosis(diagnosis.eigenvalue, run.diagnosis.margin, diagnosis.arc_share)
                 end = _End(status, t, first + k + 1.0, constant_step.fall_rate(scene, run.now, after, h))
-                _conclude(scene, _Run(y_end, after, record, diagnosis, live), end, h, block.cells[lane], results)
+                _store_outcome(scene, _Run(y_end, after, record, diagnosis, live), end, h, block.cells[lane], results)
             write(block.memory, start, WIDTH, _Run(run.y, run.now, run.record, run.diagnosis, live))
         running += int(live != FINISHED)
     return running
 
 
 @inlined
-def _conclude(scene, run, end, h, cell, results):
+def _store_outcome(scene, run, end, h, cell, results):
     """Store outcome and report of a run."""
     outcome = recorder.conclude(scene, run.record, end.status, end.t, run.y[0], run.y[1])
     rows, report, diagnosis = results.rows, results.report, run.diagnosis
@@ -469,7 +469,7 @@ def _start(batch, launches, cells, table, results):
         scene, run = take(batch, i), _initial_run(batch, launches, i, table)
         status, _ = constant_step.verdict(scene, run.now, run.now)
         if status != RUNNING:
-            _conclude(scene, run, _End(status, 0.0, 0.0, 0.0), 0.0, i, results)
+            _store_outcome(scene, run, _End(status, 0.0, 0.0, 0.0), 0.0, i, results)
             continue
         at = live // WIDTH * numbers * WIDTH + live % WIDTH
         write(flat_memory, at, WIDTH, scene)
@@ -493,7 +493,7 @@ def _advance_block(diagnosed, batch, launches, buffers, live, stretch, results):
         block = _Block(flat_memory, start * numbers, occupants[start : start + WIDTH], sample)
         k, running = 0, WIDTH
         while running > 0:
-            k = _advance(diagnosed, batch, block, table, stretch, k)
+            k = _advance_lanes(diagnosed, batch, block, table, stretch, k)
             if k == stretch.steps:
                 break
             running = _finish_ended(diagnosed, batch, block, table, stretch, k, results)
@@ -506,7 +506,7 @@ def _advance_block(diagnosed, batch, launches, buffers, live, stretch, results):
             at = (slot // WIDTH * numbers + size_of(scene)) * WIDTH + slot % WIDTH
             # The sum of the steps would miss the end of the span by rounding.
             end = _End(COMPLETE, scene.span, float(stretch.first + stretch.steps), 0.0)
-            _conclude(scene, read(flat_memory, at, WIDTH, sample), end, stretch.h, occupants[slot], results)
+            _store_outcome(scene, read(flat_memory, at, WIDTH, sample), end, stretch.h, occupants[slot], results)
         else:
             # A slice would add the code for errors about shapes, which takes a second to compile.
             for number in range(numbers):
@@ -535,7 +535,7 @@ def _history(batch, steps, interval, times, rows):
     h = scene.span / steps
     table = np.empty((3, _MOST_COLUMNS))
     y = constant_step.initial_state(scene)
-    _fill(table, scene.drive, 0, 1, h)
+    _fill_table(table, scene.drive, 0, 1, h)
     now = constant_step.inspect(scene, y, lookup(scene.drive, table, 0))
     status, _ = constant_step.verdict(scene, now, now)
     k, count, t = 0, 0, 0.0
@@ -550,7 +550,7 @@ def _history(batch, steps, interval, times, rows):
             count += 1
         if ends:
             return count
-        _fill(table, scene.drive, k, 1, h)
+        _fill_table(table, scene.drive, k, 1, h)
         status, fraction, y, now = _step_to_end(scene, y, now, table, 0, h)
         t = (k + fraction) * h
         k += 1

@@ -19,7 +19,7 @@ _with_record = replacing("record")
 
 
 @inlined
-def _first_event(c, first, entry_guard, h, work):
+def _first_event_of_series(c, first, entry_guard, h, work):
     """First guard to reach zero within the step `h`, and the time since the step began; -1 and `h` if none does.
 
     `entry_guard` is zero at the beginning; that root is divided out.
@@ -62,7 +62,7 @@ def _shared(run, s, h, reach):
 
 
 @inlined
-def _observe(scene, run, s, scratch):
+def _observe_series(scene, run, s, scratch):
     """Record after a step of length `s` of the series, with the extremes within the step."""
     c, instants = scratch.c, scratch.work[0]
     record = recorder.enter(scene, run.record, run.now.t, series.seen_at_start(scene, c))
@@ -106,6 +106,6 @@ def series_step(scene, run, h_max, tolerance, scratch):
     longest, reach = series.expand(scene, run.mode, run.now, run.y, tolerance, c)
     run = _with_record(run, enter_series(variation.asked(scene), scene, run.record, run.mode, c))
     h = min(longest, h_max)
-    guard, s = _first_event(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)
-    record = _observe(scene, run, s, scratch) if s > 0.0 else run.record
+    guard, s = _first_event_of_series(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)
+    record = _observe_series(scene, run, s, scratch) if s > 0.0 else run.record
     return guard, s, series.state_at(scene, c, s), record, _shared(run, s, h, reach)

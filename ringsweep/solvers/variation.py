@@ -16,13 +16,13 @@ _MOST_GROWTH = 1.0
 @feature("record")
 def enter_series(asked, scene, record, mode, c):
     """Record at the beginning of a step of series."""
-    return variation.enter(scene, record, mode, series.rates_at(scene, c, 0.0))
+    return variation.enter_mode(scene, record, mode, series.rates_at(scene, c, 0.0))
 
 
 @feature("record")
 def enter_implicit(asked, scene, record, start):
     """Record at the beginning of an implicit step."""
-    return variation.enter(scene, record, start.mode, start.linear[0])
+    return variation.enter_mode(scene, record, start.mode, start.linear[0])
 
 
 @feature("record")
@@ -39,7 +39,7 @@ def along_series(asked, scene, record, run, ends, scratch):
         if (end - low) * largest_trace(len(rates), len(MANY), work) > _MOST_GROWTH:
             width = 0.5 * (end - low)
             continue
-        record = variation.advance(scene, record, end - low, rates, WEIGHTS_OF_MANY, work)
+        record = variation.propagate(scene, record, end - low, rates, WEIGHTS_OF_MANY, work)
         low = end
     return record
 
@@ -59,10 +59,10 @@ def along_implicit(asked, scene, record, start, taken, ends, scratch):
         store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
     # The last node is the end.
     rates = implicit.rates(scene, start.mode, start.common, forcing, x)
-    return variation.advance(scene, record, (high - low) * taken.h, rates, WEIGHTS_OF_FEW, work)
+    return variation.propagate(scene, record, (high - low) * taken.h, rates, WEIGHTS_OF_FEW, work)
 
 
 @feature("record")
 def at_event(asked, scene, record, mode, guard, t, y):
     """Record after a guard of a mode has vanished."""
-    return variation.switched(scene, record, mode, guard, t, y)
+    return variation.apply_saltation(scene, record, mode, guard, t, y)
