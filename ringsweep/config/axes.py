@@ -15,6 +15,7 @@ from ringsweep.config.scene import sweepable
 from ringsweep.config.sections import MAX_LENGTH, check_keys, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name
+from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.trailer import MAX_CELLS
@@ -28,15 +29,15 @@ COUNT = Parameter("1", "number of values", lower=1, upper=MAX_LENGTH, whole=True
 
 _SPACINGS = ("linspace", "geomspace")
 
+# Cells that are checked at once: many zones over many points must not fill the memory.
+_CELLS_AT_ONCE = 4096
+
 #: Index of each of some cells along each dimension, by name of the dimension.
 Indices = Mapping[str, NDArray[np.intp]]
 
 #: A swept path, its place in the configuration (for messages), the path or word that names its dimension, and what is
 #: given: values, a spacing, or a DataArray, which has dimensions of its own.
 Given = tuple[Any, str, str, Any]
-
-#: A swept path, its place in the configuration, its dimensions and its values.
-Column = tuple[str, str, tuple[str, ...], NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def sweep_section(doc: Document) -> dict[str, Any]:
     if isinstance(sample := section.get("sample"), dict) and isinstance(sample.get("of"), dict):
         _inline_samples(doc, sample["of"])
     # A program may run a scene without axes, and so does the file of its result.
-    if not section and doc.columns is None and doc.result_axes is None:
+    if not section and doc.columns is None:
         raise InputError("sweep", "empty: give grid, points or sample, or leave sweep out")
     sweep = {key: columns for key, columns in section.items() if key not in ("refine", "follow")}
     for key in sweep:
@@ -110,24 +111,6 @@ def swept_paths(sweep: dict[str, Any], columns: Iterable[Given] | None = None) -
 def paths_of(key: Any) -> list[Any]:
     """Paths of an axis of a grid, or of a sample: those that vary together are separated by commas."""
     return [path.strip() for path in key.split(",")] if isinstance(key, str) else [key]
-
-
-def read_columns(scene: Scene, columns: Iterable[Given]) -> Iterator[Column]:
-    """Columns with their values.
-
-    Raises
-    ------
-    InputError
-        If a path is none of the scene, or a value is wrong.
-    """
-    known = sweepable(scene)
-    for path, where, along, given in columns:
-        parameter = swept_parameter(known, path, where)
-        if hasattr(given, "dims"):
-            yield path, where, *read_data_array(given, parameter, where)
-        else:
-            read = read_spacing if isinstance(given, dict) else read_values
-            yield path, where, (dimension(along),), read(given, parameter, where)
 
 
 def swept_parameter(known: Mapping[str, Parameter | Choice], path: object, where: str) -> Parameter | Choice:
@@ -192,16 +175,23 @@ def read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: st
     return values
 
 
-def build_axes(columns: Iterable[Column]) -> Axes:
+def build_axes(scene: Scene, columns: Iterable[Given]) -> Axes:
     """Axes from columns, in their order.
 
     Raises
     ------
     InputError
-        If the columns contradict each other, repeat a value, or make too many cells.
+        If a path is none of the scene, a value is wrong, or the columns contradict each other, repeat a value, or make
+        too many cells.
     """
-    found = Axes()
-    for path, where, dims, values in columns:
+    known, found = sweepable(scene), Axes()
+    for path, where, along, given in columns:
+        parameter = swept_parameter(known, path, where)
+        if hasattr(given, "dims"):
+            dims, values = read_data_array(given, parameter, where)
+        else:
+            read = read_spacing if isinstance(given, dict) else read_values
+            dims, values = (dimension(along),), read(given, parameter, where)
         if path in found.columns:
             also = "a column of sweep.points" if "point" in found.columns[path][0] else "on this or another axis"
             raise InputError(where, f"also {also}: a path can vary in one place only")
@@ -255,3 +245,42 @@ def by_law(
         if len(own):
             here = {dim: along[own] for dim, along in indices.items()}
             yield structure, own, values_at(scene, axes, here, len(own))
+
+
+def check_consistency(scene: Scene, axes: Axes) -> None:
+    """Let the model look for contradictions between values, in all cells of a sweep.
+
+    Raises
+    ------
+    InputError
+        If values contradict each other, such as a ring too small for its body; or if a section is asked for at each
+        period, and no cell has one.
+    """
+    # Each condition is monotone in each value, so the two extremes of a grid axis decide for the whole axis.
+    checked = []
+    for dim, size in axes.sizes.items():
+        along = [values for dims, values in axes.columns.values() if dim in dims]
+        monotone = len(along) == 1 and along[0].ndim == 1 and along[0].dtype.kind == "f"
+        checked.append(np.unique([along[0].argmin(), along[0].argmax()]) if monotone else np.arange(size))
+    shape = (1, *map(len, checked))
+    total = math.prod(shape)
+    section, periodic, able = scene.structure.section, False, MODELS[scene.structure.model].sections
+    # Without a section at turns, a motion without a period has no cycles.
+    needed = section.at == "period" if section is not None else scene.structure.exponent and "turn" not in able
+    for start in range(0, total, _CELLS_AT_ONCE):
+        flat = np.arange(start, min(start + _CELLS_AT_ONCE, total))
+        numbers = np.unravel_index(flat, shape)[1:]
+        indices = {dim: along[number] for dim, along, number in zip(axes.sizes, checked, numbers, strict=True)}
+        for structure, _, values in by_law(scene, axes, indices, len(flat)):
+            try:
+                made = batch(structure, values)
+            except InputError as error:
+                if any(path.rpartition(".")[2] in str(error) for path in axes.columns):
+                    error.problem += " (in a cell of the sweep)"
+                raise
+            if needed and not periodic:
+                periodic = bool(np.isfinite(made.forcing_period).any())
+    if needed and not periodic:
+        others = "give one, or state it by `period`" + (", or take `turn`" if "turn" in able else "")
+        where = "record.section.at" if section is not None else "record.exponent"
+        raise InputError(where, f"neither force nor drive has a period: {others}")

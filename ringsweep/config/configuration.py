@@ -13,8 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ringsweep.config import yaml_text
-from ringsweep.config.axes import Axes, Given, build_axes, columns_of, read_columns, sweep_section, swept_paths
-from ringsweep.config.consistency import check_consistency
+from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
 from ringsweep.config.follow import Follow, put_state, read_follow, run_to_continue, with_direction
 from ringsweep.config.refine import Refinement, read_refinement
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
@@ -148,7 +147,7 @@ def with_values(
         changed = _apply_settings(doc, settings)
         sweep = sweep_section(doc)
         doc.tree.pop("sweep", None)
-        doc.result_axes = None
+        doc.columns = None
         if LAW in sweep.get("grid", {}) and f"scene.{LAW}" not in changed:
             doc.tree["sweep"] = {"grid": {LAW: sweep["grid"][LAW]}}
         try:
@@ -170,7 +169,7 @@ def _document(
     if axes is not None:
         if not isinstance(axes, Mapping):
             raise InputError("axes", f"a mapping of paths to values is expected, got {show(axes)}")
-        doc.tree["sweep"], doc.result_axes = {}, None
+        doc.tree["sweep"], doc.is_result = {}, False
         doc.columns = [(path, f"axes[{path!r}]", path, given) for path, given in axes.items()]
         doc.locations |= dict.fromkeys((where for _, where, *_ in doc.columns), (None, None))
     for key, given in parts.items():
@@ -195,7 +194,10 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
             hint = ": it belongs under `scene`" if "model" in tree else suggestion(key, _SECTIONS)
             raise InputError(key, "unknown section" + hint)
     sweep = sweep_section(doc)
-    columns = columns_of(sweep) if doc.columns is None else doc.columns
+    listed = columns_of(sweep)
+    columns = listed if doc.columns is None else doc.columns
+    if doc.is_result and {path for path, *_ in listed} != {path for path, *_ in columns}:
+        raise InputError("", "is damaged, or a part of a result: its coordinates are not the axes that it was run with")
     swept = swept_paths(sweep, columns)
     for path in changed:
         if path.removeprefix("scene.") in swept:
@@ -209,14 +211,8 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         put_state(doc, parse_scene(doc, swept, laws), file, before.scene, before.axes, swept)
     scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
-    if doc.result_axes is None:
-        axes = build_axes(read_columns(scene, columns))
-    elif doc.result_axes.keys() == {path for path, *_ in columns}:
-        # A configuration cannot name the dimensions that axes share; the coordinates of a result file can.
-        axes = build_axes((path, path, dims, values) for path, (dims, values) in doc.result_axes.items())
-    else:
-        raise InputError("", "is damaged, or a part of a result: its coordinates are not the axes that it was run with")
-    if doc.result_axes is None and doc.columns is None and doc.locations:
+    axes = build_axes(scene, columns)
+    if doc.columns is None and doc.locations:
         _warn_of_plain_angles(scene, columns)
     for path, where in swept.items():
         if where in doc.locations:

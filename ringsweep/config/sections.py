@@ -77,6 +77,9 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
         if array.ndim != 1 or array.dtype.kind not in "iufOU":
             what = "names" if isinstance(parameter, Choice) else "numbers"
             raise InputError(where, f"a list of {what} is expected, got shape {array.shape} of {array.dtype}")
+        ends = (array.min(), array.max()) if array.dtype.kind == "f" and array.size else (np.nan,)
+        if isinstance(parameter, Parameter) and not parameter.whole and all(map(parameter.allows, ends)):
+            return array.astype(float)
         given = array.tolist()
     if not isinstance(given, Sequence) or isinstance(given, str | bytes):
         raise InputError(where, f"a list of values is expected, got {show(given)}")

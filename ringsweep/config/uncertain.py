@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.axes import Axes, paths_of, read_spacing, swept_parameter
-from ringsweep.config.consistency import check_consistency
+from ringsweep.config.axes import Axes, check_consistency, paths_of, read_spacing, swept_parameter
 from ringsweep.config.scene import outcome_numbers, sweepable
 from ringsweep.config.sections import Key, Keys, check_keys, one_of, read_keys, read_values, suggestion
 from ringsweep.errors import InputError

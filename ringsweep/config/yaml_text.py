@@ -53,18 +53,19 @@ class Document:
         Name of the file without suffix.
     locations : dict of str to tuple
         File and line of each dotted path.
-    result_axes : dict of str to tuple, optional
-        Only from a result file: dimensions and values of each swept path. The tree lists points along one dimension.
     columns : list of tuple, optional
-        Axes that a program gives in the place of the section ``sweep``; see :data:`ringsweep.config.axes.Given`.
+        Axes in the place of those in the section ``sweep``; see :data:`ringsweep.config.axes.Given`. A program gives
+        them, or a result file, whose coordinates have the dimensions that axes share.
+    is_result : bool
+        Whether it comes from a result file.
     """
 
     tree: dict[str, Any]
     folder: Path = field(default_factory=Path)
     name: str = "ringsweep"
     locations: dict[str, tuple[str | None, int | None]] = field(default_factory=dict)
-    result_axes: dict[str, tuple[tuple[str, ...], Any]] | None = None
     columns: list[tuple[Any, str, str, Any]] | None = None
+    is_result: bool = False
 
     @contextmanager
     def locating_errors(self) -> Iterator[None]:
@@ -100,7 +101,7 @@ class Document:
         if not isinstance(name, str):
             raise InputError(path, f"a file name is expected, got {show(name)}")
         file = self.folder / name
-        if self.result_axes is not None:
+        if self.is_result:
             # Results hold their tables, so this one was changed: it could name any file of the reader.
             logger.info("%s: read from %s", path, file)
         try:
@@ -200,22 +201,23 @@ def _opened(file: Path) -> BinaryIO:
 
 def _read_result(file: Path) -> Document:
     """The configuration in the attributes of a result file."""
+    import xarray as xr
+
     with trailer.opened(file, what="a result of ringsweep with a configuration") as content:
         tree = json.loads(content.getncattr("configuration"))
         if not isinstance(tree, dict):
             raise ValueError("a configuration is a mapping")
         if "from" in (written(tree, "initial") or {}):
             raise InputError("", "is damaged: a result holds its initial values")
-        found = None
+        columns = None
         if "regime" in content.variables and not {"time", "contender", "word"} & set(content.dimensions):
-            found = {
-                variable.path: (variable.dimensions, np.array(variable[:].tolist()))
-                for variable in content.variables.values()
-                if "path" in variable.ncattrs()
-            }
             dims = content["regime"].dimensions
-            found = dict(sorted(found.items(), key=lambda item: dims.index(item[1][0][0])))
-    return Document(_Reader().value(tree), file.parent, file.stem, {"": (str(file), None)}, found)
+            swept = [variable for variable in content.variables.values() if "path" in variable.ncattrs()]
+            columns = [
+                (one.path, one.path, one.path, xr.Variable(one.dimensions, np.array(one[:].tolist())))
+                for one in sorted(swept, key=lambda one: dims.index(one.dimensions[0]))
+            ]
+    return Document(_Reader().value(tree), file.parent, file.stem, {"": (str(file), None)}, columns, is_result=True)
 
 
 def scalar(text: str) -> Any:

@@ -14,7 +14,7 @@ from contourpy import contour_generator
 from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, load
-from ringsweep.config.consistency import check_consistency
+from ringsweep.config.axes import check_consistency
 from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import WITH_IMPACT, model_of
