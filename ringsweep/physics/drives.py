@@ -21,6 +21,7 @@ from ringsweep.compile import function_from_lines, hook, inlined, lacking, take
 from ringsweep.numerics import clock, writer
 from ringsweep.numerics.expressions import ZERO, Node, derivative, evaluate, symbols_of
 from ringsweep.numerics.functions import raised
+from ringsweep.numerics.rows import distinct_rows
 from ringsweep.numerics.series import INVERSE
 from ringsweep.physics import functions_of_time
 from ringsweep.physics.definitions import Definitions
@@ -773,7 +774,7 @@ def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np
         return drive(**columns)
     function = FORMULAS[drive]
     knots = knots_of(function, columns, len(spans))
-    some = np.unique(np.stack([*columns.values(), spans], axis=1), axis=0, return_index=True)[1]
+    some, _ = distinct_rows([*columns.values(), spans])
     values = {name: column[some] for name, column in columns.items()}
     check(function, values, knots[some], spans[some], _CONTINUOUS[function.unit])
     return drive(**columns, knots=knots) if function.knots else drive(**columns)

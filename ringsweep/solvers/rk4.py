@@ -22,6 +22,7 @@ from ringsweep.models.scene import Structure
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, side_by_side, size_of, write
+from ringsweep.numerics.rows import distinct_rows
 from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, without_shape
 from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
@@ -164,8 +165,7 @@ class RK4(Method):
 
 def _groups_by_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
     """Groups of `cells` with the same span and the same drive but for its amplitude."""
-    keys = np.stack([batch.span, *shape_numbers(batch.drive)], axis=1)[cells]
-    _, group = np.unique(keys, axis=0, return_inverse=True)
+    _, group = distinct_rows(column[cells] for column in (batch.span, *shape_numbers(batch.drive)))
     order = np.argsort(group, kind="stable")
     yield from np.split(cells[order], np.flatnonzero(np.diff(group[order])) + 1)
 

@@ -26,6 +26,7 @@ from ringsweep.numerics.isolation import (
     sign_changes,
     steepest,
 )
+from ringsweep.numerics.rows import distinct_rows
 from ringsweep.physics.friction.formula import FormulaError, Threshold
 from ringsweep.physics.friction.velocity import Expression
 
@@ -81,8 +82,9 @@ def hidden_fields(
             # Cells whose speeds are alike have the same fields.
             octave = np.exp2(np.floor(np.log2(speed)))
         columns = {**columns, _SPEED: np.broadcast_to(octave, len(surfaces[0][0]))}
-    table = np.stack([*columns.values(), *(column for surface in surfaces for column in surface)], axis=1)
-    rows, cell_row = _distinct(table)
+    table = [*columns.values(), *(column for surface in surfaces for column in surface)]
+    first, cell_row = distinct_rows(table)
+    rows = np.stack([column[first] for column in table], axis=1)
     found = (_kept_fields if len(rows) <= _MOST_KEPT else _fields_of)(expression, tuple(columns), rows)
     return {name: np.ascontiguousarray(field[cell_row]) for name, field in found.items()}
 
@@ -158,14 +160,6 @@ def _steepest_of(cubics: NDArray[np.float64], widths: NDArray[np.float64]) -> fl
         inflection = np.nan_to_num(-square / (3.0 * cube)).clip(0.0, widths)
     slopes = [abs(linear + x * (2.0 * square + x * 3.0 * cube)) for x in (0.0 * widths, inflection, widths)]
     return float(np.max(slopes, initial=0.0))
-
-
-def _distinct(table: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Distinct rows, and for each row its place among them."""
-    if (table == table[0]).all():
-        return table[:1], np.zeros(len(table), dtype=np.intp)
-    rows, place = np.unique(table, axis=0, return_inverse=True)
-    return rows, place.reshape(-1)
 
 
 class _Finder:
