@@ -21,7 +21,7 @@ from __future__ import annotations
 from math import atan2, cos, hypot, sin
 from typing import Any, NamedTuple
 
-from ringsweep.compile import feature, inlined, replacing
+from ringsweep.compile import add_scaled, feature, inlined, replacing
 from ringsweep.physics import ring
 from ringsweep.quantities.parameters import Leaf
 
@@ -232,9 +232,9 @@ def _change(row, impulses):
 
 
 @inlined
-def _size(row, impulses):
-    """Sum of the sizes of the terms of such a change."""
-    return abs(row[0] * impulses[0]) + abs(row[1] * impulses[1]) + abs(row[2] * impulses[2]) + abs(row[3] * impulses[3])
+def _largest(row):
+    """Largest change of a velocity by one of four unit impulses; since couplings are mutual, also by this impulse."""
+    return max(max(abs(row[0]), abs(row[1])), max(abs(row[2]), abs(row[3])))
 
 
 @inlined
@@ -244,33 +244,35 @@ def _by_unknowns(row, k_1, k_2, sticks_1):
 
 
 @inlined
-def _solve_three(m, right):
-    """Solution of three linear equations by Cramer's rule, and the determinant."""
-    (a, b, c), (d, e, f), (g, h, i) = m
-    p, q, r = right
-    whole = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    first = p * (e * i - f * h) - b * (q * i - f * r) + c * (q * h - e * r)
-    second = a * (q * i - f * r) - p * (d * i - f * g) + c * (d * r - q * g)
-    third = a * (e * r - q * h) - b * (d * r - q * g) + p * (d * h - e * g)
-    return first, second, third, whole
+def _product(m, x):
+    """Product of three rows with a column of three numbers."""
+    a, b, c = m
+    return (
+        a[0] * x[0] + a[1] * x[1] + a[2] * x[2],
+        b[0] * x[0] + b[1] * x[1] + b[2] * x[2],
+        c[0] * x[0] + c[1] * x[1] + c[2] * x[2],
+    )
 
 
 @inlined
 def _solved(m, right):
     """Whether three linear equations have a solution, and the solution.
 
-    Cramer's rule is applied once more to what it leaves: of a body with little inertia it leaves more than rounding.
+    The inverse is applied once more to what it leaves: of a body with little inertia it leaves more than rounding.
     """
-    x, y, z, whole = _solve_three(m, right)
+    (a, b, c), (d, e, f), (g, h, i) = m
+    minors = (
+        (e * i - f * h, c * h - b * i, b * f - c * e),
+        (f * g - d * i, a * i - c * g, c * d - a * f),
+        (d * h - e * g, b * g - a * h, a * e - b * d),
+    )
+    whole = a * minors[0][0] + b * minors[1][0] + c * minors[2][0]
     if whole == 0.0:
         return False, 0.0, 0.0, 0.0
-    x, y, z = x / whole, y / whole, z / whole
-    p, q, r = m
-    left_p, left_q = right[0] - p[0] * x - p[1] * y - p[2] * z, right[1] - q[0] * x - q[1] * y - q[2] * z
-    left = left_p, left_q, right[2] - r[0] * x - r[1] * y - r[2] * z
-    more_x, more_y, more_z, _ = _solve_three(m, left)
-    x, y, z = x + more_x / whole, y + more_y / whole, z + more_z / whole
-    return abs(x) + abs(y) + abs(z) < 1e300, x, y, z
+    share = 1.0 / whole
+    x = add_scaled((0.0, 0.0, 0.0), share, _product(minors, right))
+    x = add_scaled(x, share, _product(minors, add_scaled(right, -1.0, _product(m, x))))
+    return abs(x[0]) + abs(x[1]) + abs(x[2]) < 1e300, x[0], x[1], x[2]
 
 
 @inlined
@@ -334,6 +336,7 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
     c_21, c_22 = _couplings(mass, moment, second, first), _couplings(mass, moment, second, second)
     rows = c_11[0] + c_12[0], c_11[1] + c_12[1], c_21[0] + c_22[0], c_21[1] + c_22[1]
     unit_1, unit_2 = rows[0][0], rows[2][2]
+    sizes = _largest(rows[0]), _largest(rows[1]), _largest(rows[2]), _largest(rows[3])
     before = first.opening, first.slip, second.opening, second.slip
     aims = (
         -restitution[0] * before[0] if before[0] < 0.0 else 0.0,
@@ -372,8 +375,8 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
                 found, n_1, n_2, t = _solved((one, two, three), (right_1, right_2, right_3))
                 t_1, t_2 = t if sticks_1 else k_1 * n_1, t if sticks_2 else k_2 * n_2
             impulse = n_1, t_1, n_2, t_2
-            terms = max(max(_size(rows[0], impulse), _size(rows[1], impulse)), _size(rows[2], impulse))
-            rough = least + _CANCELLED * max(terms, _size(rows[3], impulse))
+            terms = sizes[0] * abs(n_1) + sizes[1] * abs(t_1) + sizes[2] * abs(n_2) + sizes[3] * abs(t_2)
+            rough = least + _CANCELLED * terms
             # Most modes need an impulse that pulls, or more friction than there is.
             short = max(unit_1 * (abs(t_1) - mu[0] * n_1), unit_2 * (abs(t_2) - mu[1] * n_2))
             if not found or min(unit_1 * n_1, unit_2 * n_2) < -rough or short > rough:
