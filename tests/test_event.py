@@ -91,7 +91,7 @@ class TestClosedForms:
                 "friction.rough.mu_k": rough_k,
                 "friction.rest.mu_s": rest_s,
                 "friction.rest.mu_k": rest_k,
-                "time.span": 20.0,
+                "time.span": 40.0,
             },
             model=model,
         )
