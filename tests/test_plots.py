@@ -14,7 +14,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from PIL import Image
 
 from ringsweep import plots
 from ringsweep.errors import InputError
@@ -388,13 +387,6 @@ def test_notebook_shows_a_picture_without_the_inline_magic():
     assert plots.history(make_history())._repr_png_().startswith(b"\x89PNG")
 
 
-def test_axes_are_saved_with_their_figure(tmp_path):
-    figure = plots.regime_map(make_sweep())
-    for name, what in (("figure.png", figure), ("axes.png", figure.axes[0])):
-        plots.save(what, tmp_path / name)
-    assert (tmp_path / "axes.png").read_bytes() == (tmp_path / "figure.png").read_bytes()
-
-
 def test_map_axis_may_have_a_single_value():
     for ds in (make_sweep((1, 5)), make_sweep((5, 1)), make_sweep((1, 1))):
         assert mesh(plots.regime_map(ds)).get_array().shape == ds["regime"].transpose().shape
@@ -523,12 +515,6 @@ def test_probability_along_one_axis_is_a_line_with_a_band_for_each_regime():
     assert "separating" in title(plots.regime_map(ds.isel(word=[0])))
 
 
-def test_one_sampled_cell_is_drawn_as_bars_and_a_grid_of_cells_as_maps():
-    bars = plots.regime_map(sampled(12), sel={"drive_amplitude": 10.0})
-    assert bars.axes[0].get_xlabel() == "probability (95 % interval)"
-    assert len(mesh(plots.regime_map(sampled(4, 3))).get_array()) == 3
-
-
 PICTURES = {
     "map": lambda: plots.regime_map(named_sweep()),
     "map of numbers": lambda: plots.regime_map(named_sweep(), var="t_separation"),
@@ -573,13 +559,6 @@ class TestPaper:
             with pytest.raises(InputError, match=r"legend: 'nowhere'.*below.*upper left"):
                 draw(make_sweep(), legend="nowhere")
 
-    def test_numbers_in_pictures_have_true_minus_signs(self):
-        ds = make_sweep((12, 9, 2)).assign_coords(friction_rough_mu_k=[-2e-6, 0.1])
-        text = title(plots.regime_map(ds, sel={"friction.rough.mu_k": -2e-6}))
-        assert "= \N{MINUS SIGN}2\N{MULTIPLICATION SIGN}10⁻⁶" in text
-        steps = make_work().assign_attrs(target=1e-6)
-        assert "target, 10⁻⁶" in entries(plots.work_precision(steps))
-
 
 class TestStyle:
     def test_style_can_be_taken_back_and_drawing_changes_no_setting(self):
@@ -620,14 +599,6 @@ class TestStyle:
                 lighter, darker = sorted((luminance(colour), page), reverse=True)
                 least = 1.1 if isinstance(artist, Line2D) and artist.get_linewidth() < 0.7 else 2.0
                 assert (lighter + 0.05) / (darker + 0.05) > least, (artist, colour)
-
-    def test_print_style_has_text_of_eight_points_and_fine_dots(self, tmp_path):
-        plots.style("print", width=85)
-        figure = plots.regime_map(make_sweep())
-        assert figure.axes[0].xaxis.label.get_fontsize() == 8
-        plots.save(figure, tmp_path / "map.png")
-        with Image.open(tmp_path / "map.png") as picture:
-            assert picture.width == pytest.approx(85 / 25.4 * 300, abs=1)
 
     def test_unknown_style_is_refused(self):
         before = dict(matplotlib.rcParams)
@@ -672,22 +643,6 @@ class TestPanels:
             assert "(" in ax.get_ylabel()
         with pytest.raises(InputError, match="did you mean omega"):
             plots.history_panel(make_history(), "omeg", panel())
-
-    def test_history_panel_of_several_laws_has_a_line_for_each(self):
-        one = make_history().drop_vars(["mode", "zone_1", "zone_2"])
-        ds = xr.concat([one, one], "friction_law").assign_coords(friction_law=["coulomb", "stiction"])
-        ax = plots.history_panel(ds, "phi", Figure().add_subplot())
-        assert [text.get_text() for text in ax.get_legend().get_texts()] == ["coulomb", "stiction"]
-
-    def test_panels_without_axes_draw_in_the_current_axes(self):
-        from matplotlib import pyplot
-
-        try:
-            for draw, ds in ((plots.map_panel, make_sweep()), (plots.history_panel, make_history())):
-                assert draw(ds) is pyplot.gca()
-            assert len(pyplot.get_fignums()) == 1
-        finally:
-            pyplot.close("all")
 
 
 def test_points_are_drawn_at_their_coordinates_in_colours_of_regimes():
@@ -876,15 +831,6 @@ class TestWorkPrecision:
         assert words == ["method 0", "no error (at the floor)", "failed (at the ceiling)"]
         ds["error_end"][:] = 0.0
         assert (plots.work_precision(ds).axes[0].lines[0].get_ydata() > 0.0).all()
-
-    def test_missing_errors_are_ignored_and_a_method_without_any_is_not_drawn(self):
-        ds = make_work(2)
-        ds["error_end"][4:] = np.nan
-        ds["error_end"][0, 1:] = np.nan
-        axes = plots.work_precision(ds).axes[0]
-        assert [line.get_label() for line in axes.lines if "method" in str(line.get_label())] == ["method 0"]
-        with pytest.raises(InputError, match="no value"):
-            plots.work_precision(ds.isel(contender=slice(4, None)))
 
     def test_target_recommendation_and_wrong_regimes_are_shown_if_present(self):
         ds = make_work()
