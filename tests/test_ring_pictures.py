@@ -266,14 +266,6 @@ class TestStyle:
         view = plots.polar_view(run, 1.0, Figure().add_subplot())
         assert {"0", "π/2", "π"} <= {text.get_text() for text in view.texts}
 
-    def test_dark_film_has_a_dark_page_and_covers_the_future_with_it(self, run, tmp_path):
-        plots.style("dark")
-        plots.save_animation(run, tmp_path / "run.gif", fps=5, duration=0.4)
-        with Image.open(tmp_path / "run.gif") as film:
-            assert film.convert("RGB").getpixel((0, 0)) == (30, 30, 30)
-        cover = films._Film(run, 5.0, 1.0).futures[0]
-        assert cover.get_facecolor()[:3] == pytest.approx(np.array([30, 30, 30]) / 255)
-
 
 @pytest.mark.parametrize(
     "draw",
@@ -379,19 +371,6 @@ class TestCommand:
         monkeypatch.chdir(tmp_path)
         (tmp_path / "case.yaml").write_text(json.dumps({"scene": scene}))
         return tmp_path
-
-    def test_animate_names_the_file_after_the_configuration(self, run, folder, monkeypatch, capsys):
-        asked = []
-        monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: asked.append(config) or run)
-        monkeypatch.setattr(
-            "ringsweep.plots.save_animation", lambda *given, progress: asked.append((*given, progress)), raising=False
-        )
-        assert main(["animate", "case.yaml", "--set", "drive.amplitude=4"]) == 0
-        config, (ds, path, progress) = asked
-        assert config.scene.values["drive.amplitude"] == 4.0
-        assert ds is run
-        assert (path, progress) == ("case-run.gif", True)
-        assert "wrote case-run.gif" in capsys.readouterr().out
 
     def test_animate_refuses_before_the_run(self, scene, folder, monkeypatch, capsys):
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))
