@@ -226,35 +226,6 @@ def test_wrong_options_for_dask_are_refused_in_one_line(scene, tmp_path, monkeyp
 
 
 @pytest.mark.slow
-def test_frozen_scheduler_does_not_hold_up_the_second_interrupt(scene, monkeypatch):
-    """The scheduler takes no leave; without a bound the client would wait for a minute."""
-    monkeypatch.setattr("ringsweep.runs.dask._LEAVE", 0.1)
-    frozen, asked = threading.Event(), []
-
-    def never(*_, **__):
-        asked.append(threading.current_thread())
-        frozen.wait()
-
-    def interrupt(*_):
-        signal.raise_signal(signal.SIGINT)
-        return result(*_)
-
-    result = TaskSizes.learn
-    try:
-        with LocalCluster(1, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL) as alone:
-            with monkeypatch.context() as patch:
-                patch.setattr("distributed.Client.unregister_worker_plugin", never)
-                patch.setattr(TaskSizes, "learn", interrupt)
-                address = alone.scheduler_address
-                with pytest.raises(KeyboardInterrupt):
-                    ringsweep.sweep(scene, {"drive.amplitude": [1.0, 2.0]}, scheduler=address, progress=False)
-            assert asked
-            assert threading.main_thread() not in asked
-    finally:
-        frozen.set()
-
-
-@pytest.mark.slow
 def test_workers_that_pause_for_want_of_memory_are_told_with_a_cure(monkeypatch, caplog):
     """A worker above its limit takes no task. Here the scheduler says so of one that works a second."""
     monkeypatch.setattr(remote, "_PAUSE", 0.05)
