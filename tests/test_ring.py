@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from solutions import ball, made, rod
+from solutions import ball, rod
 
 from ringsweep.compile import kernel, take
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface.constant_step import inspect
 from ringsweep.physics import ring
-from ringsweep.physics.friction.laws import BengisuAkay
-from ringsweep.physics.ring import Ring, acceleration, acceleration_slope, reactions
-from ringsweep.physics.zones import Arc, surface_of
+from ringsweep.physics.ring import acceleration, acceleration_slope, reactions
 
 angles = st.floats(-20.0, 20.0)
 friction_ratios = st.floats(-1.2, 1.2)
@@ -117,14 +115,6 @@ def solution(body, K1, K2, phi, omega):
 
 
 class TestDeclaredBalances:
-    @given(states())
-    def test_solution_of_two_contacts_solves_the_declared_balances(self, state):
-        epsilon, N1, N2 = motion(*state)
-        scale = force_scale(state[0], state[-1], epsilon, N1, N2)
-        found = solution(*state)
-        assert abs(found[0] - epsilon) * state[0].mass * state[0].radius < 1e-9 * scale
-        assert np.abs(found[1:] - [N1, N2]).max() < 1e-9 * scale
-
     @given(states(), st.floats(-1e-3, 1e-3))
     def test_audit_sees_a_wrong_reaction(self, state, share):
         body, K1, K2, phi, omega = state
@@ -294,33 +284,6 @@ class TestOneContact:
             gaps.append((abs(epsilon_2 - epsilon) * R + abs(N1 + N2 - N) / M) / scale)
         assert gaps[0] < 1e-2
         assert gaps[2] < 1e-8
-
-
-class TestMirror:
-    """In a mirror image phi, omega, theta and K change sign, and contacts 1 and 2 are exchanged."""
-
-    @given(states())
-    def test_acceleration_and_reactions_of_a_mirror_image_are_mirrored(self, state):
-        body, K1, K2, phi, omega = state
-        epsilon, N1, N2 = motion(*state)
-        scale = force_scale(body, omega, epsilon, N1, N2)
-        mirrored, M1, M2 = motion(body, -K2, -K1, -phi, -omega)
-        assert mirrored == -epsilon
-        assert abs(M1 - N2) < 1e-13 * scale
-        assert abs(M2 - N1) < 1e-13 * scale
-
-    @given(angles, angles, st.floats(-30, 30), st.floats(-30, 30), st.floats(-3, 3), st.floats(0.1, 1.5))
-    def test_friction_of_a_mirror_image_is_mirrored(self, cells, phi, theta, omega, ring_omega, center, half_angle):
-        def at(sign):
-            surface = surface_of([Arc(sign * center, half_angle, 0.5, 0.3)], 0.2, 0.1)
-            scene = Ring(body, surface, made(BengisuAkay, alpha=1.0, v0=0.5), None, 0.0, 0.0, 1.0, 0.0)
-            return _friction(scene, sign * phi, sign * omega, sign * theta, sign * ring_omega)
-
-        body = take(cells().body, 0)
-        edges = [center + side * half_angle + contact for side in (-1, 1) for contact in (-body.beta, body.beta)]
-        assume(all(abs((phi - theta - edge + pi) % (2 * pi) - pi) > 1e-9 for edge in edges))
-        (K1, K2), (slope_1, slope_2) = at(1)
-        assert at(-1) == ((-K2, -K1), (slope_2, slope_1))
 
 
 class TestGeometry:
