@@ -120,26 +120,6 @@ class TestMethods:
         assert found.normal_min_2 == pytest.approx(run.normal_2.min(), rel=1e-3)
         assert found.stick_time == pytest.approx(np.diff(run.t)[run.mode[:-1] == 0].sum(), abs=1e-3)
 
-    def test_run_that_separates_is_certified(self, dahl):
-        assert solve(Implicit(), dahl(FAST, 1e5)).certified
-
-
-class TestMirror:
-    """The mirror image exchanges the contacts."""
-
-    def test_mirrored_scene_exchanges_the_deflections(self, dahl):
-        one, other = (
-            history(dahl(LAUNCH, MILD, initial__omega=16.0 * side, zone__center=0.3 * side), 20_000)
-            for side in (1.0, -1.0)
-        )
-        np.testing.assert_allclose(one.phi, -other.phi, atol=1e-12)
-        for mine, its in ((1, 2), (2, 1)):
-            mine, its = f"_{mine}", f"_{its}"
-            np.testing.assert_allclose(getattr(one, "normal" + mine), getattr(other, "normal" + its), rtol=1e-9)
-            np.testing.assert_allclose(
-                getattr(one, "deflection" + mine), -getattr(other, "deflection" + its), atol=1e-15
-            )
-
 
 class TestEnergy:
     """On a ring at rest friction dissipates energy."""
