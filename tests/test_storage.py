@@ -146,13 +146,6 @@ def test_folder_without_permission_to_write_is_refused(tmp_path, monkeypatch):
         files.check_writable(tmp_path / "out.nc")
 
 
-def test_check_of_a_path_does_not_change_an_existing_file(tmp_path):
-    (tmp_path / "out.nc").write_text("old")
-    files.check_writable(tmp_path / "out.nc")
-    assert (tmp_path / "out.nc").read_text() == "old"
-    assert os.listdir(tmp_path) == ["out.nc"]
-
-
 def test_load_names_the_problem_of_a_file(tmp_path):
     (tmp_path / "text.nc").write_text("time,phi\n0,0\n")
     xr.Dataset({"a": 1}, attrs={"Conventions": "CF-1.11"}).to_netcdf(tmp_path / "foreign.nc")
