@@ -4,12 +4,10 @@ import json
 
 import numpy as np
 import pytest
-import xarray as xr
 from belts import on_belt
 
 import ringsweep
 from ringsweep import cli
-from ringsweep.runs.thresholds import in_words
 from ringsweep.storage import netcdf
 
 BELT = on_belt({"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, 2.0, velocity=0.1, span=10.0)
@@ -140,23 +138,3 @@ class TestDistribution:
         assert "50% below 0.2" in said or "50% below inf" in said
         # k < 0.2 m g / (v T) = 1.962 N/m begins within: 46.2 % of the points.
         assert "; in 69 it begins nowhere there" in said or "; in 68 it begins nowhere there" in said
-
-
-class TestInWords:
-    """Lines are made from datasets of known numbers, without runs."""
-
-    def test_number_has_the_digits_that_its_error_leaves(self):
-        flags = {"flag_values": np.arange(2, dtype=np.int8), "flag_meanings": "oscillatory jammed"}
-        found = xr.Dataset(
-            {
-                "error": ("vertex", [1e-6]),
-                "begins": ("vertex", [1]),
-                "beyond": ("vertex", np.zeros(1, dtype=np.int8), flags),
-            },
-            coords={"zone_half_angle": ("vertex", [np.radians(15.0)], {"units": "rad"})},
-            attrs={"threshold_path": "zone.half_angle", "boundary_of": "jammed", "scan": "3 runs"},
-        )
-        line = in_words(found).splitlines()[0]
-        assert line == "jammed begins at zone.half_angle = 0.2617994 ± 1.0e-06 rad; below: oscillatory"
-        plain = found.assign_coords(zone_half_angle=found.zone_half_angle.assign_attrs(units="1"))
-        assert "= 0.2617994 ± 1.0e-06; below" in in_words(plain)
