@@ -470,12 +470,3 @@ class TestParts:
         assert float(first.x_end) == float(again.x_end)
         assert float(first.x_end) == pytest.approx(float(ringsweep.simulate(listed).x_end), abs=1e-12)
         assert "force" in json.loads(first.attrs["configuration"])["scene"]["force"]
-
-    def test_swept_force_is_a_coordinate_with_its_unit(self):
-        scene = forced(friction=0.4, force={"frequency": 0.2})
-        del scene["force"]["amplitude"]
-        axes = {"force.amplitude": ["1 N", "0.002 kN"], "force.phase": ["0 deg", "90 deg"]}
-        found = ringsweep.sweep(scene, axes, progress=False)
-        assert found.force_amplitude.values.tolist() == [1.0, 2.0]
-        assert found.force_amplitude.attrs["units"] == "N"
-        assert found.force_phase.attrs["units"] == "rad"
