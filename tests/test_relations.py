@@ -1,4 +1,4 @@
-"""Relations between runs that hold for all parameters: symmetry, scales, equivalent scenes, limits.
+"""Relations between runs that hold for all parameters: symmetry, scales, shifts of time, order.
 
 The scenes are random. Runs without a certificate are left out, and must be few. No reference solution is needed.
 """
@@ -9,71 +9,9 @@ import numpy as np
 import pytest
 import relations
 from relations import Kind
-from solutions import solve
 from tiers import mostly_slow
 
 import ringsweep
-from ringsweep.quantities.flags import SEPARATING
-from ringsweep.solvers.event import Auto
-
-COUNT = 1000
-WORDS = ("regime", "motion")
-PLACES = ("rough", "rest")
-
-
-def draw(rng, count=COUNT, high=0.4):
-    """Random values by path: friction, a zone, a drive and a launch; some with very low or high friction."""
-    values = {
-        "zone.center": rng.uniform(-np.pi, np.pi, count),
-        "zone.half_angle": rng.choice([0.0, np.pi, 0.01, 1.0], count, p=[0.05, 0.05, 0.1, 0.8]),
-        "drive.amplitude": rng.choice([-1, 1], count) * 10 ** rng.uniform(-1, 1.2, count),
-        "initial.phi": rng.choice([0.0, 0.5, 1.0], count, p=[0.5, 0.4, 0.1]) * rng.uniform(-np.pi, np.pi, count),
-        "initial.omega": rng.choice([0.0, 1.0], count) * rng.uniform(-40, 40, count),
-        "time.span": rng.uniform(0.3, 2.0, count),
-    }
-    values["zone.half_angle"] *= np.where(values["zone.half_angle"] == 1.0, rng.uniform(0.05, 3.0, count), 1.0)
-    level = rng.choice([0.02, 1.0, 3.0], count, p=[0.15, 0.75, 0.1])
-    for place in PLACES:
-        kinetic = rng.uniform(0.02, high, count) * level
-        values[f"friction.{place}.mu_k"] = kinetic
-        values[f"friction.{place}.mu_s"] = kinetic + rng.choice([0.0, 1.0], count) * rng.uniform(0, 0.3, count) * level
-    return values
-
-
-def both_certified(first, second):
-    """Whether both runs of each cell are certified, which must be so for nearly all cells."""
-    certified = (first.certified == 1) & (second.certified == 1)
-    assert certified.mean() > 0.98
-    return certified
-
-
-def assert_alike(first, second, cells, atol=1e-6, **signs):
-    for name in WORDS:
-        np.testing.assert_array_equal(getattr(first, name)[cells], getattr(second, name)[cells], err_msg=name)
-    for name in ("t_end", "phi_end", "omega_end"):
-        a, b = getattr(first, name)[cells], signs.get(name, 1.0) * getattr(second, name)[cells]
-        # A few long runs may amplify the tolerance by more.
-        difference = np.abs(a - b) / (1.0 + np.abs(a))
-        assert np.quantile(difference, 0.995) < atol, name
-
-
-@pytest.fixture(params=mostly_slow(["stiction", "bengisu-akay"], ("stiction",)))
-def scenes(request, cells):
-    """Batch under a set-valued or a smooth law, driven by the arctan law."""
-    law = request.param
-    rng = np.random.default_rng(1)
-    of_law = {} if law == "stiction" else {"friction.alpha": 10 ** rng.uniform(0, 5, COUNT)}
-    if law != "stiction":
-        of_law["friction.v0"] = 10 ** rng.uniform(-6, -0.5, COUNT)
-
-    def build(values, **more):
-        count = len(next(iter(values.values())))
-        return cells(
-            {path: column[:count] for path, column in of_law.items()} | values, law=law, drive="arctan", **more
-        )
-
-    return build
-
 
 #: Kinds of scenes by name. The first ones take kernels that other tests take too.
 SPRING = ("spring.cubic", "damper.coefficient")
@@ -270,48 +208,3 @@ class TestShiftOfTime:
             # What is left of the error at the launch has no bound of its own.
             bound = whole[f"{name}_error"] + after[f"{name}_error"] + 30.0 * before[f"{name}_error"]
             assert float((abs(whole[name] - after[name]) / bound).quantile(0.99)) < 1.0
-
-    def test_run_continued_from_its_middle_ends_in_the_same_state(self, cells):
-        """On a ring at rest, a run launched from the state in the middle of the span."""
-        values = draw(np.random.default_rng(26))
-        values["drive.amplitude"][:] = 0.0
-        whole = solve(Auto(), cells(values, law="stiction", drive="arctan"))
-        half = solve(Auto(), cells(values | {"time.span": 0.5 * values["time.span"]}, law="stiction", drive="arctan"))
-        rest = {"initial.phi": half.phi_end, "initial.omega": half.omega_end, "time.span": 0.5 * values["time.span"]}
-        rest = solve(Auto(), cells(values | rest, law="stiction", drive="arctan"))
-        continued = (half.t_end == 0.5 * values["time.span"]) & (whole.certified == 1) & (rest.certified == 1)
-        assert continued.mean() > 0.4
-        np.testing.assert_allclose(whole.phi_end[continued], rest.phi_end[continued], atol=1e-6)
-        separating = [(found.regime == SEPARATING)[continued] for found in (whole, rest)]
-        np.testing.assert_array_equal(*separating)
-
-
-class TestEquivalentScenes:
-    """Scenes that are described in two ways."""
-
-    @staticmethod
-    def with_arcs(values, arcs):
-        """Values with the zone replaced by other zones, each a pair ``(center, half_angle)``."""
-        changed = {path: x for path, x in values.items() if not path.startswith(("zone.", "friction.rough."))}
-        for k, (center, half_angle) in enumerate(arcs):
-            changed |= {f"zones.{k}.center": center, f"zones.{k}.half_angle": half_angle}
-            changed |= {f"zones.{k}.{name}": values[f"friction.rough.{name}"] for name in ("mu_s", "mu_k")}
-        return changed
-
-    def test_two_adjacent_arcs_equal_one_arc(self, scenes):
-        values = draw(np.random.default_rng(28))
-        center, half = values["zone.center"], 0.25 * values["zone.half_angle"]
-        arcs = [(center - 2 * half, 2 * half), (center + 2 * half, 2 * half)]
-        first = solve(Auto(), scenes(values))
-        second = solve(Auto(), scenes(self.with_arcs(values, arcs), arcs=("zones.0", "zones.1")))
-        assert_alike(first, second, both_certified(first, second))
-
-    def test_order_of_disjoint_arcs_changes_no_bit(self, scenes):
-        values = draw(np.random.default_rng(29), 300)
-        center, half = values["zone.center"], np.minimum(values["zone.half_angle"], 0.7)
-        arcs = [(center, half), (center + 2.0, half), (center - 2.0, half)]
-        names = ("zones.0", "zones.1", "zones.2")
-        first, second = (
-            solve(Auto(), scenes(self.with_arcs(values, order), arcs=names)) for order in (arcs, arcs[::-1])
-        )
-        np.testing.assert_array_equal(first.rows, second.rows)
