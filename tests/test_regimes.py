@@ -9,19 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, SEPARATED_1, SEPARATED_2
-from ringsweep.models.ring import record as record_module
+from ringsweep.models.ring.record import outcome_of, record_after, record_at_launch
 from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 EPSILON = 1e-3
-begin, observe, conclude = record_module.begin, record_module.observe, record_module.conclude
 
 
 def outcome(phi, omega, status=COMPLETE, normal_1=1.0, normal_2=1.0, stuck_for=0.0):
     """Outcome of a run through the states `phi` and `omega`."""
-    record = begin((phi[0], omega[0], normal_1, normal_2, ()), EPSILON)
+    record = record_at_launch((phi[0], omega[0], normal_1, normal_2, ()), EPSILON)
     for x, w in zip(phi[1:], omega[1:], strict=True):
-        record = observe(record, (), stuck_for, (x, w, normal_1, normal_2, ()), EPSILON)
-    return conclude(record, status, float(len(phi) - 1), phi[-1], omega[-1])
+        record = record_after(record, (), stuck_for, (x, w, normal_1, normal_2, ()), EPSILON)
+    return outcome_of(record, status, float(len(phi) - 1), phi[-1], omega[-1])
 
 
 def path(*angles, speed=1.0):
@@ -120,7 +119,7 @@ class TestEnd:
     @pytest.mark.parametrize("status", [COMPLETE, SEPARATED_1, JAM, BROKEN])
     @pytest.mark.parametrize(("phi", "omega"), [(nan, 0.0), (0.0, inf), (-inf, nan)])
     def test_run_that_ends_in_a_state_that_is_not_finite_is_failed(self, status, phi, omega):
-        found = conclude(begin((0.0, 1.0, 1.0, 1.0, ()), EPSILON), status, 1.0, phi, omega)
+        found = outcome_of(record_at_launch((0.0, 1.0, 1.0, 1.0, ()), EPSILON), status, 1.0, phi, omega)
         assert (found.regime, found.motion, found.separating_contact) == (FAILED, FAILED, 0)
         assert isnan(found.t_separation)
 
