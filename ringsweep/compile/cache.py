@@ -114,4 +114,5 @@ def _without_collection(compiled: Callable[..., Any]) -> Callable[..., Any]:
 
 @cache
 def _announce_compilation() -> None:
+    """Tell once in a process that a kernel is compiled."""
     logger.info("compiling for a new kind of scene: this takes 5 to 15 seconds, once")

@@ -68,6 +68,7 @@ class Cells:
 
 
 def _leaves(batch: Any) -> Iterator[Any]:
+    """Arrays of a batch, in order."""
     if not isinstance(batch, tuple):
         yield batch
         return
@@ -82,6 +83,7 @@ def _with_whole_rows(leaf: Any) -> Any:
 
 
 def _address(array: Any) -> int:
+    """Address of the first number of an array."""
     found: int = array.__array_interface__["data"][0]
     return found
 
@@ -181,16 +183,19 @@ register_model(Reference)(models.OpaqueModel)
 
 @typeof_impl.register(Cells)
 def _type_of_cells(cells: Any, context: Any) -> Any:
+    """Numba type of :class:`Cells` that a kernel is given; Numba calls it."""
     return _cells_type(cells.layout)
 
 
 @cache
 def _cells_type(layout: Any) -> Any:
+    """Numba type of cells of this kind, made once."""
     return CellsType(_cell_type(layout))
 
 
 @unbox(CellsType)  # type: ignore[untyped-decorator]
 def _unbox_cells(kind: Any, cells: Any, c: Any) -> Any:
+    """Address of the first cell, for a kernel; Numba calls it."""
     number = c.pyapi.object_getattr_string(cells, "address")
     address = c.pyapi.long_as_voidptr(number)
     c.pyapi.decref(number)
@@ -232,10 +237,12 @@ def _load(context: Any, builder: Any, kind: Any, pointer: Any, offset: int) -> A
 
 
 def _shifted(builder: Any, pointer: Any, offset: int) -> Any:
+    """Pointer that is `offset` bytes farther."""
     return builder.gep(pointer, [ir.Constant(_INTEGER, offset)]) if offset else pointer
 
 
 def _load_word(builder: Any, kind: Any, pointer: Any, offset: int) -> Any:
+    """Number or address in the block."""
     value = builder.load(builder.bitcast(_shifted(builder, pointer, offset), kind.as_pointer()), align=_WORD)
     # Nothing writes to the block while a kernel runs: a number that was loaded once need not be loaded again.
     value.set_metadata("invariant.load", builder.module.add_metadata([]))
@@ -243,6 +250,7 @@ def _load_word(builder: Any, kind: Any, pointer: Any, offset: int) -> Any:
 
 
 def _load_array(context: Any, builder: Any, kind: Any, pointer: Any, offset: int) -> Any:
+    """View of an array of which the block holds the address and the shape."""
     view = context.make_array(kind)(context, builder)
     lengths = [_load_word(builder, _INTEGER, pointer, offset + _WORD * (k + 1)) for k in range(kind.ndim)]
     strides: list[Any] = []
@@ -262,16 +270,19 @@ def _load_array(context: Any, builder: Any, kind: Any, pointer: Any, offset: int
 
 @lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
 def _attribute(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+    """Field of a reference by its name; Numba calls it."""
     return _field(context, builder, kind, value, kind.fields.index(name))
 
 
 def _field(context: Any, builder: Any, kind: Any, value: Any, k: int) -> Any:
+    """Field `k` of a reference."""
     return _load(context, builder, kind.types[k], value, kind.offsets[k])
 
 
 @lower_builtin("static_getitem", Reference, types.IntegerLiteral)  # type: ignore[untyped-decorator]
 @lower_builtin("static_getitem", Reference, types.SliceLiteral)  # type: ignore[untyped-decorator]
 def _item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Field of a reference by an index, or a tuple of fields by a slice; Numba calls it."""
     kind, (value, index) = sig.args[0], args
     if isinstance(index, slice):
         values = [_field(context, builder, kind, value, k) for k in range(len(kind))[index]]

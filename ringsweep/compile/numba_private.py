@@ -52,9 +52,11 @@ class _CalleeLibrary(JITCodeLibrary):
         self._reload_init: set[Any] = set()
 
     def add_ir_module(self, ir_module: Any) -> None:
+        """Keep the text of a function; Numba would compile it."""
         self._text = cgutils.normalize_ir_text(str(ir_module))
 
     def finalize(self) -> None:
+        """Take over from callees what must be initialised when the code is loaded."""
         for library in self._linking_libraries:
             self._reload_init.update(library._reload_init)
         self._finalized = True
@@ -68,6 +70,7 @@ class _CalleeLibrary(JITCodeLibrary):
         return found
 
     def _get_module_for_linking(self) -> Any:
+        """Module with all callees, for Numba's own functions."""
         # Kernels do not come here, but functions of Numba's own that call a function of the package.
         if self._shared_module is None:
             self._shared_module = self.module()
@@ -79,6 +82,7 @@ class _KernelLibrary(JITCodeLibrary):
     """Code of a kernel with all functions that it calls."""
 
     def finalize(self) -> None:
+        """Link each callee once, and make all functions but the kernel's own private to it."""
         module = self._final_module
         own = {function.name for function in module.functions if not function.is_declaration}
         _link_all(module, self._linking_libraries)
@@ -93,6 +97,7 @@ class _KernelLibrary(JITCodeLibrary):
         super().finalize()
 
     def _optimize_final_module(self) -> None:
+        """Optimise once, without Numba's cheap passes before."""
         # Numba's cheap passes before these serve to remove reference counts, which kernels hardly have.
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
@@ -116,6 +121,8 @@ def _link_all(module: Any, libraries: list[Any]) -> None:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _KernelLowering(NativeLowering):
+    """Numba's pass that writes the code of a kernel."""
+
     _name = "kernel_lowering"
 
     def run_pass(self, state: Any) -> bool:
@@ -126,6 +133,8 @@ class _KernelLowering(NativeLowering):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _CalleeLowering(NativeLowering):
+    """Numba's pass that writes the code of a function which kernels call, but does not compile it."""
+
     _name = "callee_lowering"
 
     def run_pass(self, state: Any) -> bool:
@@ -149,6 +158,7 @@ class _ReferenceCounts(NRTContext):
     """Reference counts without the code that takes apart tuples of numbers in search of arrays."""
 
     def get_meminfos(self, builder: Any, ty: Any, val: Any) -> Any:
+        """Reference counts in a value; none are looked for in a tuple of numbers."""
         if not _holds_arrays(self._context.data_model_manager, ty):
             return []
         return super().get_meminfos(builder, ty, val)
@@ -156,6 +166,7 @@ class _ReferenceCounts(NRTContext):
 
 @cache
 def _holds_arrays(models: Any, kind: Any) -> bool:
+    """Whether a value of a Numba type has a reference count in it."""
     return bool(models[kind].contains_nrt_meminfo())
 
 
@@ -171,6 +182,8 @@ class _ArrayReleases(IRLegalization):
 
 
 class _Target(CPUContext):
+    """Numba's target with :class:`_ReferenceCounts`."""
+
     @cached_property
     def nrt(self) -> Any:
         return _ReferenceCounts(self, self.enable_nrt)
@@ -186,6 +199,7 @@ class _Typing(Context):
     """Numba's typing with a memory of signatures. For each operation Numba tries dozens of overloads."""
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+        """Signature of a call, remembered by function and types of the arguments."""
         if kws or not (type(func) is types.Function or func in _OPERATORS):
             return super().resolve_function_type(func, args, kws)
         key = id(func), tuple(args)
@@ -198,6 +212,7 @@ class _Typing(Context):
         return _signatures[key][1]
 
     def resolve_value_type(self, val: Any) -> Any:
+        """Type of a global; operators remember their signatures."""
         found = super().resolve_value_type(val)
         return _Operator(found.templates) if type(found) is types.Function and val in _OPERATORS else found
 
@@ -210,6 +225,7 @@ class _Operator(types.Function):
     """Numba type of an operator, whose signatures are remembered."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        """Signature of an operation, remembered by types of the arguments."""
         key = id(self), tuple(args)
         if key not in _signatures:
             _signatures[key] = self, super().get_call_type(context, args, kws)
@@ -243,6 +259,8 @@ def choose_body(function: Callable[..., Any], choose: Callable[..., Any], option
     compiled: dict[Any, Any] = {}
 
     class Template(AbstractTemplate):
+        """How Numba finds signature and code of a call."""
+
         key = function
 
         def generic(self, args: Any, kws: Any) -> Any:
@@ -274,6 +292,7 @@ class _Passes(PassManager):
     """Passes without a record of each of them: it prints the types of all arguments."""
 
     def _runPass(self, index: int, one: Any, state: Any) -> None:
+        """Run a pass."""
         one.analysis = self._analysis
         one.run_initialization(state)
         one.run_pass(state)
@@ -299,6 +318,7 @@ class _KernelCompiler(CompilerBase):
         self.state.targetctx.typing_context = self.state.typingctx
 
     def define_pipelines(self) -> list[Any]:
+        """Passes for a function, by whether Numba must inline something in it."""
         code = self.state.func_id.func.__code__
         closures = any(isinstance(constant, CodeType) for constant in code.co_consts)
         return [self._passes(not closures and _INLINED_BY_NUMBA.isdisjoint(code.co_names))]
@@ -317,6 +337,8 @@ class _KernelCompiler(CompilerBase):
 
 
 class _CalleeCompiler(_KernelCompiler):
+    """As :class:`_KernelCompiler`, for a function that kernels call."""
+
     lowering = _CalleeLowering
 
 
@@ -324,6 +346,7 @@ class _Borrowed(types.Array):
     """Numba type of an array without a reference count."""
 
     def copy(self, *arguments: Any, **changes: Any) -> Any:
+        """The same with changes; Numba makes types of views by it."""
         return without_count(super().copy(*arguments, **changes))
 
 
@@ -334,6 +357,8 @@ def without_count(array: Any) -> Any:
 
 @register_model(_Borrowed)
 class _BorrowedModel(ArrayModel):
+    """Memory of a borrowed array: that of an array whose count nobody looks at."""
+
     def contains_nrt_meminfo(self) -> bool:
         return False
 
@@ -368,10 +393,15 @@ class _NamedFiles(IndexDataCacheFile):
     """
 
     def _path(self, key: Any) -> Path:
+        """File of a kernel: its function, a stamp of the sources, and a digest of Numba's key.
+
+        Other sources and another version of Numba have other files, so no old code is ever loaded.
+        """
         name = hashlib.sha256(repr((self._version, self._index_name, key)).encode()).hexdigest()
         return Path(self._cache_path, f"{self._index_name.partition('-')[0]}-{self._source_stamp}-{name[:32]}.nbc")
 
     def save(self, key: Any, data: Any) -> None:
+        """Write a kernel, and remove those of other sources that are older than :data:`_KEPT`."""
         body = self._dump((self._index_name, key, data))
         with self._open_for_write(self._path(key)) as file:
             file.write(hashlib.sha256(body).digest() + body)
@@ -382,6 +412,7 @@ class _NamedFiles(IndexDataCacheFile):
                     old.unlink()
 
     def load(self, key: Any) -> Any:
+        """Data of a kernel; None if there is no intact file with exactly this key."""
         try:
             content = self._path(key).read_bytes()
             body = content[_DIGEST:]
@@ -448,4 +479,5 @@ def keep_on_disk(dispatcher: Any, digest: str, announce: Callable[[], None]) -> 
 
 @cache
 def _warn_of_no_cache(why: str) -> None:
+    """Warn once for each reason."""
     logger.warning("compiled code cannot be kept (%s): each process compiles its own", why)

@@ -84,6 +84,7 @@ class SingleContactRing(Model, Continues):
 
     @property
     def _point(self) -> tuple[str, ...]:
+        """Outcomes of a point of the section: angle, angular velocity, and the deflection at each contact."""
         return SECTION[: 2 + self.contacts]
 
     def obstacle(self, structure: Structure) -> str | None:
@@ -130,6 +131,7 @@ class SingleContactRing(Model, Continues):
         return super().required(structure)
 
     def _has_bristles(self, structure: Structure) -> bool:
+        """Whether the friction law has bristles."""
         return friction.family_of(structure.law_type) is friction.Dynamic
 
     def history(self, structure: Structure) -> tuple[str, ...]:
