@@ -1,4 +1,9 @@
-"""Audit of runs on the belt: violations of the friction law and of the balance of momentum."""
+"""Audit of runs on the belt: violations of the friction law and of the balance of momentum.
+
+Solvers call what this file implements through :mod:`ringsweep.models.interface.audit`. K is friction per unit of the
+load; `motion` is displacement (m), force (N) and velocity in space (m/s); `forcing` begins with place, velocity and
+acceleration of the belt. A violation of 1 is what the tolerance explains.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +37,7 @@ _FALL_FACTOR = 5.0
 
 @audit.least_scales.implements(Belt, BristleBelt)
 def _least_scales_on_belt(batch):
-    """The scale of a time at least, s: that of a spring's swing."""
+    """Implement :func:`audit.least_scales`: of times, s, that of a swing on the spring."""
     with np.errstate(divide="ignore", over="ignore"):
         return {"s": np.minimum(np.sqrt(batch.body.mass / np.abs(batch.body.stiffness)), batch.span)}
 
@@ -94,7 +99,7 @@ def _undecided_on_belt(batch, one, other, fall_rates):
 
 
 def _sliding_or_swing(batch, one, other):
-    """Around steady sliding the errors of the steps look like an oscillation, in both runs."""
+    """Which oscillatory runs may only slide: around steady sliding the errors of the steps look like a swing."""
     stiffness = batch.body.stiffness
     pace = np.where(stiffness > 0.0, np.sqrt(batch.body.mass / stiffness), 0.0)
     apart = np.maximum(np.abs(one.x_end - other.x_end), np.abs(one.swing - other.swing))
@@ -105,7 +110,7 @@ def _sliding_or_swing(batch, one, other):
 
 
 def _may_hold(body, one, other, fall_rates):
-    """Whether the error could undo a separation, or add one."""
+    """Which runs an error could make separate, or keep from separating; `fall_rates` in N/s."""
     if not ring.if_load_varies(body, True, False):
         return np.zeros(len(fall_rates), dtype=bool)
     growth = body.normal_stiffness

@@ -2,6 +2,9 @@
 
 The state is ``(x, velocity, z)`` for steps of constant length, with the velocity in space. Otherwise it is
 ``(x, v, z)``, with the sliding velocity. z is the deflection of the bristles.
+
+Read :mod:`ringsweep.physics.friction.presliding` first. `sign` is the direction of the slip that the bristles resist;
+`region` is BAND while the contact counts as stuck, else KINETIC.
 """
 
 from __future__ import annotations
@@ -34,7 +37,7 @@ def _sliding(scene, motion, x, sign, region):
 
 @absorbed
 def _in_band(scene, v, z, sign):
-    """Whether the contact counts as stuck."""
+    """Whether the contact counts as stuck: the guard of the region BAND is positive."""
     return region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0
 
 

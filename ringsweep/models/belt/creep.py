@@ -1,4 +1,8 @@
-"""Implicit steps on the belt, in the stiction band of a smooth law, where the body creeps relative to the belt."""
+"""Implicit steps on the belt, in the stiction band of a smooth law, where the body creeps relative to the belt.
+
+Read :mod:`ringsweep.models.interface.implicit` first. `x` is displacement relative to the belt (m), sliding velocity
+(m/s), and deflection (m) of bristles; `forcing` begins with place, velocity and acceleration of the belt.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Friction on the body on the belt under laws of the velocity alone, and the scales of its motion."""
+"""Friction on the body on the belt under laws of the velocity alone, and the scales of its motion.
+
+In this file `x` is the displacement in space, m, and `v` the sliding velocity, m/s. `forcing` is what
+:func:`ringsweep.physics.drives.turn` returns: place, velocity and acceleration of the belt, then rate and value of
+the external force if there is one.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +26,7 @@ def if_force(body, yes, no):
 
 @absorbed
 def moving(scene, velocity, v, belt_velocity):
-    """Velocity of a body in the state `v`, m/s: `velocity`, but that of the belt in a dead band.
+    """Velocity in space, m/s: `velocity`, or in a dead band that of the belt, with which the body moves.
 
     Karnopp's sliding velocity is zero in the band, where `v` is the momentum by the mass.
     """
@@ -31,7 +36,7 @@ def moving(scene, velocity, v, belt_velocity):
 
 @absorbed
 def slip_from(scene, x, velocity, v, forcing):
-    """The :class:`Slip` of a body.
+    """The :class:`Slip` of a body on the belt under a law of the velocity.
 
     Parameters
     ----------

@@ -3,6 +3,9 @@
 A *stop* is an interval in which the body sticks to the belt, and stays longer than a motion that only passes or grazes
 the speed of the belt. A *cycle* is a period of the forcing, and a natural period if the forcing has none; in a free
 motion it lasts from one turn of the displacement to the next of its kind. See :mod:`ringsweep.models.cycles`.
+
+`r` is the record before an observation; `now` is the interval that ends with the observation. Numbers may be vector
+lanes, so conditions are written with `select`; where no lane needs it, an ``if any_of(...)`` skips the work.
 """
 
 from __future__ import annotations
@@ -188,7 +191,10 @@ _ROUNDING = 1e-6
 
 @inlined
 def record_at_launch(scene, t, seen, band, play):
-    """Record at the beginning of a run."""
+    """Record at the beginning of a run.
+
+    `band` and `play` are fields of :class:`Record`; `seen` is described at :func:`_observe_on_belt`.
+    """
     x, velocity, force, place, v, v_rate, acceleration, _ = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
@@ -284,7 +290,7 @@ def _leaves(scene, r, place):
 
 @absorbed
 def _least_slip(r):
-    """Distance that a slip is longer than, m; negative without bristles, which creep a little before they hold."""
+    """Distance by which a body must move to have slipped, m; negative without bristles: any motion is slip."""
     return select(r.play < 0.0, r.play, max(r.play, RETURN * (r.x_max - r.x_min)))
 
 
@@ -295,24 +301,24 @@ def _least_turn(r, span):
 
 
 def _located(before, now):
-    """`now`, for methods that locate events; they run with floats."""
+    """`now`, the form for floats: methods that locate events know the last time and rate exactly."""
     return now
 
 
 @lanes_body(_located)
 def _located_in_lanes(before, now):
-    """The last time itself, see :func:`_located`."""
+    """`before`, the form for vector lanes: methods of constant step do not need the value."""
     return before
 
 
 def _rate(by_difference, v_rate):
-    """Rate of the sliding velocity: over an interval that is but rounding, the one by difference would be noise."""
+    """Rate of the sliding velocity, m/s^2: `v_rate` if the method knows it, else the one by difference."""
     return v_rate if v_rate != 0.0 else by_difference
 
 
 @lanes_body(_rate)
 def _rate_in_lanes(by_difference, v_rate):
-    """The difference alone, see :func:`_rate`."""
+    """The rate by difference: methods of constant step know no other."""
     return by_difference
 
 
@@ -462,7 +468,7 @@ def _settles_to(scene, r, t):
 
 @feature("means")
 def _of_last_cycles(parts, c, repeats, means):
-    """Share, stops, swing and mean velocity of the last half of the cycles; `means` if there are none."""
+    """Share of stick, stops in a cycle, swing (m), mean velocity (m/s) of the last half; `means` without halves."""
     before = parts.before
     if c.count <= before.count:
         return means

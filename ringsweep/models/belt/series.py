@@ -2,6 +2,9 @@
 
 The state is ``(x, v)`` with the displacement in space and the sliding velocity. The difference of two large velocities
 would lose all its digits.
+
+Read :mod:`ringsweep.models.interface.series` first. `c` is the table of series; ``c[ROW, k]`` is coefficient k, with
+the rows that are named below. In a kernel the order of statements counts: each coefficient needs those before it.
 """
 
 from __future__ import annotations
@@ -258,7 +261,7 @@ def _from_no_load(c, sticks):
 
 @inlined
 def _held_term(body, c, k, one, acceleration):
-    """Coefficients `k` of the reaction and of the force that friction must balance; `one` is that of 1."""
+    """Coefficients `k` of the reaction and of the pull, N, of a stuck body; `one` is coefficient `k` of 1."""
     motion = c[X, k], c[PUSH, k], c[VELOCITY, k]
     c[NORMAL, k], _, friction = ring.held(body, one, motion, _cube_term(body, c, k), acceleration, 0.0)
     return c[NORMAL, k], -friction
@@ -306,7 +309,7 @@ def _seen_at_start_on_belt(scene, c):
 
 @inlined
 def _seen_sliding(scene, v, difference):
-    """Sliding velocity of the body; `difference` is that of the velocities, which loses digits."""
+    """Sliding velocity for the recorder, m/s: in a law with a dead band v is a momentum, so `difference` counts."""
     return difference if _has_dead_band(scene) else v
 
 

@@ -1,4 +1,8 @@
-"""The variational equation on the belt: Jacobians of the modes, and gradients of the guards at events."""
+"""The variational equation on the belt: Jacobians of the modes, and gradients of the guards at events.
+
+The record carries a :class:`ringsweep.models.tangent.Tangent`, which these functions replace; they run only if the
+scene asks for an exponent.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +64,7 @@ def _switch_tangent_on_belt(scene, record, mode, guard, t, y):
 
 @hook
 def _gradient(scene, mode, guard, t, y, rates):
-    """Gradient of a guard by the state over the rate of the guard, in the mode that ends."""
+    """Gradient of a guard by the state, divided by its rate, in the mode that ends; `rates` of the state."""
 
 
 @_gradient.implements(Belt)
