@@ -3,6 +3,10 @@
 The audit uses neither the series nor the segments of a mode. The coefficients are those of the surface at the angle of
 each contact; reactions and accelerations are those of :mod:`ringsweep.physics.ring`, and they are put into the balances
 as these are written down. The formulas of the friction law are also used by the solver.
+
+Solvers call what this file implements through :mod:`ringsweep.models.interface.audit`. `rho` is the angle of the body
+in the ring's frame, `under` the static and kinetic coefficient under contact 1 and contact 2. A violation of 1 is
+what the tolerance explains.
 """
 
 from __future__ import annotations
@@ -119,7 +123,7 @@ _FALL_FACTOR = 5.0
 
 @audit.least_scales.implements(ring.Ring, ring.BristleRing)
 def rates_and_times(batch):
-    """The scales of an angular velocity, rad/s, and of a time, s, at least.
+    """Implement :func:`audit.least_scales`: of angular velocities, rad/s, and of times, s; the impact calls it too.
 
     See :func:`ringsweep.models.sliding.rate_at_rest`.
     """
@@ -135,7 +139,7 @@ def _is_reaction_on_ring(scene, guard):
 
 @audit.undecided.implements(ring.Ring, ring.BristleRing)
 def undecided_on_contacts(batch, one, other, fall_rates):
-    """Which runs are so close to another regime that their error could change it, see :func:`audit.undecided`."""
+    """Implement :func:`audit.undecided`; the impact calls it too."""
     # Comparisons with NaN are false.
     with np.errstate(invalid="ignore", over="ignore"):
         return _is_near_another_regime(batch, one, other, fall_rates) | _is_launched_on_edge(batch)

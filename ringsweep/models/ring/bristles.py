@@ -4,6 +4,10 @@ Friction per unit of the normal reaction is ``K_i = -(sigma0 z_i + sigma1 dz_i/d
 those of the surface under the contact. The state is ``(phi, omega, z_1, z_2)`` for steps of constant length, and
 ``(rho, v, z_1, z_2)``, with the angle in the ring's frame and the sliding velocity, for implicit steps. At launch the
 bristles are deflected as in steady sliding at the launch velocity.
+
+Read :mod:`ringsweep.physics.friction.presliding` first. `under` is the static and kinetic coefficient under contact 1
+and contact 2; `sign` is the direction of the slip that the bristles resist; `region` is BAND while the body counts as
+stuck, else KINETIC.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""The surface under the contacts of a body in the ring: coefficients, friction, zones and edges."""
+"""The surface under the contacts of a body in the ring: coefficients, friction, zones and edges.
+
+`rho` is the angle of the body in the ring's frame, rad. A *place* is a pair of whole numbers: segment of the surface,
+and turn of the ring. Which place a contact on an edge has depends on where it moves: the mode keeps it.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 The state is ``(rho, v)``: angle in the ring's frame and sliding velocity. So no state is the difference of two large
 numbers, however slow the creep.
+
+Read :mod:`ringsweep.models.interface.implicit` and :mod:`ringsweep.models.slip` first.
 """
 
 from __future__ import annotations

@@ -4,6 +4,9 @@ A run ends a little before it: there the acceleration grows like the reciprocal 
 sliding speed. So the velocity nears its limit like the root of the time left. The determinant of a place depends on the
 sliding velocity alone, so the limit is one of its roots. Reactions that grow with the acceleration have no greatest
 value: they are infinite.
+
+`y` is the state of a mode, whose second number is the sliding velocity v, m/s. ``modes.limit_of_jam`` is called once,
+after a run has ended with JAM.
 """
 
 from __future__ import annotations

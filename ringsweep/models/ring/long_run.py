@@ -24,7 +24,7 @@ OUTCOMES = "period", "settled", "long_run"
 
 
 class Asked(NamedTuple):
-    """What a scene asks for: what its motion settles to.
+    """Field ``long_run`` of a scene that asks for what its motion settles to.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ with_tangent, _with_section = replacing("tangent"), replacing("section")
 
 @feature("()")
 def launched(asked, scene, t, seen):
-    """Long run at the beginning of a run; an empty tuple if it is not asked for."""
+    """Record of a long run at its beginning; an empty tuple if the scene does not ask for it."""
     phi, omega = seen[0], seen[1]
     first, start = cycles.end_of(scene, scene.forcing_period, 1.0), Mark(t, phi, omega, 0.0, 0.0)
     started = cycles.none_yet(asked, first, start)
@@ -74,13 +74,13 @@ def launched(asked, scene, t, seen):
 
 @feature("long_run")
 def with_room(long_run, scene, row):
-    """Long run whose points lie in a row of outcomes."""
+    """Record of a long run whose points of the section are stored in the row of outcomes of the run."""
     return _with_section(long_run, section.lent(scene.section, long_run, row, (nan, nan)))
 
 
 @feature("inf")
 def next_cycle_end(long_run):
-    """Time that a step must show the record, s; infinite if there is none."""
+    """Time of the end of the present cycle, s, at which a step must end; infinite if nothing is recorded."""
     return long_run.cycles.next
 
 

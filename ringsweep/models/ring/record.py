@@ -85,7 +85,7 @@ class Outcome(NamedTuple):
 
 @inlined
 def record_at_launch(seen, epsilon_omega):
-    """Record at the beginning of a run."""
+    """Record at the beginning of a run; `seen` is described at :func:`_observe_on_ring`."""
     phi, omega, normal_1, normal_2, acceleration = seen[0], seen[1], seen[2], seen[3], seen[4]
     sense = 1.0 if omega > epsilon_omega else -1.0 if omega < -epsilon_omega else 0.0
     reactions, shocks = (normal_1, normal_2), shock.at_launch(acceleration)
@@ -149,7 +149,7 @@ def turns_of(record):
 
 @inlined
 def word_of_motion(record):
-    """Motion up to now."""
+    """Motion up to now: REVOLVING, OSCILLATORY or RESTING."""
     return REVOLVING if turns_of(record) >= 1 else OSCILLATORY if record.reversals > 0 else RESTING
 
 

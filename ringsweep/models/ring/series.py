@@ -7,6 +7,11 @@ resolve a stiction band of 1e-9 m/s.
 In slip with constant K the acceleration is linear in sine and cosine of phi, in omega and in its square. In stick the
 body accelerates like the ring, and the balances of :mod:`ringsweep.physics.ring` give the reactions: no differential
 equation is left.
+
+Read :mod:`ringsweep.models.interface.series` first. `c` is the table of series: ``c[ROW, k]`` is coefficient k, with
+the rows named below. A *place* is the segment under a contact and the turn of the ring; `rho` is the angle of the
+body in the ring's frame; K is friction per unit of a reaction. Functions that return a status return a constant of
+:mod:`ringsweep.models.interface.status`.
 """
 
 from __future__ import annotations
@@ -141,7 +146,7 @@ def _begin_on_ring(scene):
 
 @feature("False", of=drives.Power)
 def _is_jerked(drive, scene, t, v):
-    """Whether `v` is the sliding velocity of a body that was at rest before an infinite acceleration of the ring."""
+    """Whether `v` comes only from an infinite acceleration of the ring at t = 0, before which the body was at rest."""
     if v == 0.0 or parts(t)[0] != drives.beginning(drive) or ring.launch_velocity(scene) != 0.0:
         return False
     return v == drives.velocity_at_beginning(drive, 0.0) * scene.body.radius
@@ -161,7 +166,7 @@ def _table_shape_on_ring(scene):
 
 @inlined
 def mode_at(scene, t, phi, v):
-    """Status, mode and sliding velocity of a body on closed contacts that has the sliding velocity `v`."""
+    """Status, mode and sliding velocity (m/s) of a body on closed contacts; `phi` in rad, `v` in m/s."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     held = held_at(scene, phi - theta)
     if stiction_band(scene.law) == 0.0 and (v == 0.0 or leaves_behind(scene, t, v)):
@@ -196,7 +201,7 @@ def slipping(scene, mode, rho, slip):
 
 @inlined
 def _at_breakaway(scene, mode):
-    """Friction coefficient under each contact at the beginning of slip."""
+    """Friction coefficients under contacts 1 and 2 as slip begins; static if the law does not drop there."""
     mu_s1, _, mu_s2, _ = surfaces = coefficients_under(scene, mode)
     mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, 0.0, surfaces)
     # Friction that does not drop at breakaway is static friction, without the rounding of the formula.
@@ -236,7 +241,7 @@ def _mode_at_rest(scene, mode, t, phi, stick_end):
 
 @hook
 def friction_and_motion(scene, mode, t, y):
-    """Friction K at each contact in the slip of a mode, and the motion, as :func:`ring.acceleration` takes them."""
+    """``((K1, K2), motion)`` in the slip of a mode, as :func:`ring.acceleration` takes them."""
 
 
 @friction_and_motion.implements(ring.Ring)
@@ -279,7 +284,7 @@ def _status_at_start(drive, scene, mode, t, y):
 
 @inlined
 def _loads_in_slip(scene, mode, t, y):
-    """Determinant of the balances, both reactions and their scale in slip, from the balances and not from a series."""
+    """Determinant of the balances, N1, N2 and their scale (N) in slip, from the balances and not from a series."""
     body, (K, motion) = scene.body, friction_and_motion(scene, mode, t, y)
     epsilon, determinant = ring.acceleration(body, *K, motion)
     normal_1, normal_2 = ring.reactions(body, *K, motion)
@@ -313,7 +318,7 @@ def _separated(body, normals, scale, first):
 
 @inlined
 def _after_zero_reaction(scene, mode, first, t, y):
-    """Status after a reaction has vanished, see :func:`lost_in_slip`."""
+    """Status after the reaction of contact 1 (`first`) or of contact 2 has vanished, in slip or in stick."""
     if mode.sign != 0:
         return lost_in_slip(scene, mode, first, t, y)
     # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band still
@@ -510,13 +515,13 @@ specialise(_expand_slip, lambda law, *others: _slip_under(law))
 
 @inlined
 def _constant_term(balance, sine, cosine, omega, square):
-    """Coefficient 0 of a series from a row of :func:`ringsweep.physics.ring.slip_balance`."""
+    """Coefficient 0 of an acceleration or a reaction, from its row in :func:`ring.slip_balance`."""
     return balance[0] + balance[1] * sine + balance[2] * cosine + balance[3] * omega + balance[4] * square
 
 
 @absorbed
 def _term(balance, sine, cosine, omega, square, loaded_1, loaded_2):
-    """Coefficient 1 or higher of a series from such a row; the newest numbers come last."""
+    """Coefficient 1 or higher, else as :func:`_constant_term`; `loaded` are friction forces, which come last."""
     of_motion = balance[1] * sine + balance[2] * cosine + balance[3] * omega + balance[4] * square
     return (of_motion + balance[5] * loaded_1) + balance[6] * loaded_2
 

@@ -1,4 +1,7 @@
-"""The variational equation on the ring: Jacobians of the modes, and gradients of the guards at events."""
+"""The variational equation on the ring: Jacobians of the modes, and gradients of the guards at events.
+
+These functions run only if the scene asks for an exponent.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ _SMALL = 1e-5
 
 @inlined
 def _with(record, new):
-    """Record with another tangent."""
+    """Record with the tangent `new`."""
     return with_long_run(record, with_tangent(record.long_run, new))
 
 
@@ -48,7 +51,7 @@ def _switch_tangent_on_ring(scene, record, mode, guard, t, y):
 
 @inlined
 def _gradient(scene, mode, guard, t, y, rates):
-    """Gradient of a guard by the state over the rate of the guard, in the mode that ends."""
+    """Gradient of a guard by the state, divided by its rate, in the mode that ends; `rates` of the state."""
     if mode.sign == 0:
         return _gradient_of_reserve(scene, mode, t, y[0])
     if guard == EDGE:

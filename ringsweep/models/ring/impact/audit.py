@@ -3,6 +3,9 @@
 A pivot is put into the balances as :mod:`ringsweep.physics.pivot` declares them, with the accelerations of the
 dense output: they give the reaction and the friction, which must obey the law. Gaps follow from the places of the
 balls.
+
+Read :mod:`ringsweep.models.interface.audit` and :mod:`mode` first. `one` and `other` hold the outcomes of two runs of
+each cell, by name.
 """
 
 from __future__ import annotations
@@ -120,7 +123,7 @@ def _undecided_with_impact(batch, one, other, fall_rates):
 
 
 def _all_lost(one):
-    """Outcomes in which the separating contacts are all that have been open: their least reaction is zero."""
+    """Outcomes in which ``separating_contact`` has all contacts that were ever open."""
     lost = 1.0 * (one.normal_min_1 == 0.0) + 2.0 * (one.normal_min_2 == 0.0)
     contacts = np.where(one.regime == SEPARATING, lost, one.separating_contact)
     return SimpleNamespace(**vars(one) | {"separating_contact": contacts})

@@ -2,6 +2,9 @@
 
 While both contacts hold, the steps are those of the closed ring. In a pivot the state is
 ``(psi - theta, v, eta, eta_dot, code)``, see :mod:`mode`, so that no state is the difference of two large numbers.
+
+`f` is the :class:`ringsweep.physics.pivot.Frame` of the pivot, `found` its solution: accelerations of psi and alpha
+(rad/s^2), normal reaction and friction (N).
 """
 
 from __future__ import annotations

@@ -10,6 +10,9 @@ tells what the others are:
   while eta_dot is zero;
 - flight: ``(psi, d psi/dt, x, dx/dt, y, dy/dt, gap_1, gap_2)``, with the place of the centre of mass. It tells the
   measures of both gaps, see :data:`ringsweep.models.ring.series.GAP_1`, too, but not with all digits of small ones.
+
+A *pivot* is a body on one contact, a *flight* has none. `turned` is 1 once the contacts have changed their order
+along the race, `contact` is 1 or 2, `places` are segment and turn of each contact.
 """
 
 from __future__ import annotations
@@ -111,13 +114,13 @@ _with_zeros, _with_first, _with_second = replacing("zeros_1", "zeros_2"), replac
 
 @inlined
 def with_zeros(mode, zeros):
-    """Mode with other zeros of the gaps."""
+    """Mode in which the gaps have these leading zeros, see :class:`Contacts`."""
     return with_contacts(mode, _with_zeros(mode.contacts, *zeros))
 
 
 @inlined
 def ring_of(scene, turned):
-    """The ring while both contacts hold, in the order of the contacts."""
+    """Scene of the closed ring, with the contacts in their first order, or `turned`."""
     return scene.turned if turned == 1 else scene.closed
 
 
@@ -159,7 +162,7 @@ def coefficients_there(scene, place):
 
 @inlined
 def frame(scene, y, ring_omega):
-    """Place and rates of the pivot in the state `y`."""
+    """The :class:`ringsweep.physics.pivot.Frame` of a pivot in the state `y`."""
     body, balls, code = scene.closed.body, scene.balls, int(y[-1] + 0.5)
     contact = 2 if code % TURNED == FIRST else 1
     delta = delta_when_closed(scene, contact, code // TURNED) + y[2]

@@ -1,4 +1,8 @@
-"""The pivot: a body on one contact, see :mod:`ringsweep.physics.pivot`, in the friction and the motion of a mode."""
+"""The pivot: a body on one contact, see :mod:`ringsweep.physics.pivot`, in the friction and the motion of a mode.
+
+Only ``switch.py``, ``jam.py`` and ``creep.py`` beside this file call it. `y` is the state of a pivot, see
+:mod:`mode`; `f` its :class:`ringsweep.physics.pivot.Frame`; `carried` the acceleration of the race, m/s^2.
+"""
 
 from __future__ import annotations
 
@@ -103,7 +107,7 @@ def begun(scene, t, y, stick, stick_end):
 
 @inlined
 def solution(scene, mode, t, y):
-    """Solution in the slip or in the stick of a mode."""
+    """Accelerations of psi and alpha (rad/s^2), reaction and friction (N) in the slip or stick of a mode."""
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     f = frame(scene, y, ring_omega)
     if mode.sign == 0:

@@ -1,4 +1,8 @@
-"""Record and outcome of runs that go on after a contact is lost."""
+"""Record and outcome of runs that go on after a contact is lost.
+
+`r` is the record before, with the record of the closed ring as ``r.base``. Read
+:class:`ringsweep.models.ring.impact.mode.Event` first.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,9 @@
 The rows of the table are those of :mod:`ringsweep.models.ring.series`. The guard of a contact is its normal reaction
 while it holds, and its gap while it is open. A gap that has just opened begins with coefficients that are zero; its
 guard is the series divided by that power of the time.
+
+`c` is the table of series, ``c[ROW, k]`` coefficient k. `f` is the :class:`ringsweep.physics.pivot.Frame` of a pivot.
+`fresh` is how many coefficients of its gap are zero because the contact has just opened, see :class:`mode.Contacts`.
 """
 
 from __future__ import annotations
@@ -364,7 +367,7 @@ def _is_particle_in_flight(scene, contacts):
 
 @inlined
 def _polar(scene, c, s):
-    """Angle of a particle in flight, near the one at the beginning of the step, its rate and its acceleration."""
+    """Angle (rad) of a particle in flight, its rate and its acceleration; without jumps of a whole turn in a step."""
     x, y, x_dot, y_dot = value(c[X], s), value(c[Y], s), slope(c[X], s), slope(c[Y], s)
     square = x * x + y * y
     angle = atan2(x, -y)
@@ -407,7 +410,7 @@ def _rates_at_with_impact(scene, c, s):
 
 @inlined
 def _value(row, s):
-    """Value of a series whose higher coefficients need not be finite at `s` = 0."""
+    """Value of a series at the time `s`; at 0 only the first coefficient is read, as the others may be infinite."""
     return row[0] if s == 0.0 else value(row, s)
 
 

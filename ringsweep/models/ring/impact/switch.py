@@ -1,4 +1,10 @@
-"""Which mode follows another while contacts open and close."""
+"""Which mode follows another while contacts open and close.
+
+Solvers call :func:`ringsweep.models.interface.modes.begin` and ``switch`` once for each event; nothing here runs
+within a step. Read :mod:`mode` first: the state `y` of nine numbers, and the :class:`mode.Contacts` of a mode.
+`zeros` are the leading coefficients of a gap that are zero when it opens; `event` is the :class:`mode.Event` that the
+new mode remembers. Rebounds that are *summed* are taken at their limit: the contact closes.
+"""
 
 from __future__ import annotations
 
@@ -99,7 +105,7 @@ _TOGETHER, _ROUNDING = 1e-12, 1e-15
 
 @inlined
 def motion_of(scene, y, ring_omega):
-    """Motion of the body in space."""
+    """Motion in space, from the state `y` of nine numbers; with ``ring_omega = 0`` relative to the race."""
     code = int(y[-1] + 0.5)
     contacts, turned = code % TURNED, code // TURNED
     if contacts == NONE:
@@ -132,7 +138,7 @@ def state_in_flight(motion, turned, gaps):
 
 @inlined
 def _presses(scene, contact, motion):
-    """Whether a free body closes the gap of a contact that touches."""
+    """Whether the gap of a contact that touches would close, if the body were free."""
     gravity = scene.closed.body.gravity
     least = -_NO_LOAD * (gravity + scene.balls.reach * motion.psi_dot * motion.psi_dot)
     return free_gap_acceleration(scene.balls, contact, motion, gravity) < least
@@ -140,7 +146,10 @@ def _presses(scene, contact, motion):
 
 @inlined
 def _opened(scene, t, y, before, which, zeros, event):
-    """Status, mode and state after contacts of a closed ring have opened; `y` and `before` are its state and mode."""
+    """Status, mode and state after contacts of a closed ring have opened.
+
+    `y` and `before` are its state and mode; `which` is FIRST, SECOND or BOTH.
+    """
     _, ring_omega, _ = drives.turn(scene.drive, t)
     turned = before.contacts.turned
     if which != BOTH:
@@ -159,7 +168,7 @@ def _opened(scene, t, y, before, which, zeros, event):
 
 @inlined
 def _after_closed(scene, t, found, zeros, is_new):
-    """Status, mode and state from those that the closed ring has found.
+    """Status, mode and state from `found`, those of the closed ring: a contact that it has lost is opened.
 
     `is_new` is whether the last event is the impact that has just closed the contacts.
     """
@@ -232,7 +241,7 @@ def _switch_with_impact(scene, mode, guard, t, y):
 
 @inlined
 def _takes_off(scene, mode, t, y, zeros):
-    """Status, mode and state after the contact that holds in a pivot has opened; `zeros` are those of its gap."""
+    """Status, mode and state after the contact that holds in a pivot has opened: a flight."""
     contacts, contact = mode.contacts, holding(mode)
     both = (zeros, contacts.zeros_2) if contact == 1 else (contacts.zeros_1, zeros)
     event = opens(contact, contacts.event.number, t)
@@ -243,7 +252,7 @@ def _takes_off(scene, mode, t, y, zeros):
 
 @inlined
 def _jammed(scene, mode, v):
-    """Status of a pivot whose denominator nearly vanishes in slip.
+    """Status of a pivot in slip whose determinant nearly vanishes: BROKEN if friction rises with speed, else JAM.
 
     The reaction that grows meanwhile slows the slip down. Where friction rises with the speed, this keeps the contact
     from jamming, but only under an almost infinite acceleration of the ring does it come so near.
@@ -261,7 +270,7 @@ def _gaps_in_pivot(scene, mode, y):
 
 @inlined
 def _remaining(mode, y, zeros):
-    """Zeros of both gaps: those of the contact that was open before are zeros no more once the gap has grown."""
+    """Leading zeros of both gaps after an event in a pivot: none for the gap that has grown since it opened."""
     if y[2] == 0.0:
         return zeros
     return (0, zeros[1]) if mode.contacts.open == FIRST else (zeros[0], 0)
@@ -269,7 +278,7 @@ def _remaining(mode, y, zeros):
 
 @inlined
 def _on_one_contact(scene, mode, guard, t, y):
-    """What follows in a pivot after an edge, at the bounds of a region of the law, at rest, and at breakaway."""
+    """Status, mode and state after a guard of slip or stick in a pivot: an edge, a bound, rest, or breakaway."""
     v, stick_end, (mu_s, _, _) = y[1], 0, coefficients_there(scene, place_of(mode))
     if guard == EDGE:
         mode = with_place(mode, _beyond_nearer_edge(scene, mode, t, y))
@@ -297,7 +306,7 @@ def _beyond_nearer_edge(scene, mode, t, y):
 
 @inlined
 def _begun(scene, t, y, stick, stick_end):
-    """Status, mode and state of a pivot whose sliding velocity is zero; it may turn into a flight."""
+    """Status, mode and state of a pivot at rest on its contact, by :func:`pivot.begun`; it may turn into a flight."""
     status, found = pivot.begun(scene, t, y, stick, stick_end)
     # Friction in stick may have pressed the ball against the race: when it drops, the contact opens.
     if status == JAM and not load(frame(scene, y, drives.turn(scene.drive, t)[1])) > 0.0:
@@ -307,7 +316,7 @@ def _begun(scene, t, y, stick, stick_end):
 
 @inlined
 def _impact_friction(scene, contact, theta):
-    """Friction coefficient of an impact at a contact."""
+    """Friction coefficient of an impact at a :class:`Contact`, 1; `theta` is the angle of the ring."""
     mu_s, mu_k, _ = coefficients_there(scene, locate(scene.closed.surface, contact.alpha - theta))
     if scene.has_kinetic > 0.0:
         return mu_k
@@ -451,14 +460,14 @@ def _closes_within(share, mode, t, contact):
 
 @inlined
 def _closing(landing, hits):
-    """Largest speed with which a contact hits, m/s."""
+    """Largest closing speed of the contacts that hit, m/s."""
     first, second = landing.contacts
     return max(-first.opening if hits[0] else 0.0, -second.opening if hits[1] else 0.0)
 
 
 @inlined
 def _try(scene, mode, t, y, landing, hits, restitution, lasts):
-    """What an impact leads to in which these contacts hit.
+    """What an impact leads to, in which the contacts `hits` hit.
 
     `restitution` is that of each contact, if it hits; `lasts` is the time until rebounds end that are summed, s.
     """
@@ -495,7 +504,7 @@ def _try(scene, mode, t, y, landing, hits, restitution, lasts):
 
 @inlined
 def _falls(scene, mode, t, y, motion, contact):
-    """Acceleration with which the gap of an open contact closes, m/s^2; 0 if the contact holds."""
+    """Acceleration with which the gap of an open contact closes, m/s^2; 0 for a contact that holds."""
     balls = scene.balls
     if mode.contacts.open == BOTH:
         return -free_gap_acceleration(balls, contact, motion, scene.closed.body.gravity)
@@ -511,7 +520,7 @@ def _falls(scene, mode, t, y, motion, contact):
 
 @inlined
 def _rebounds_end(scene, tried, t, contact):
-    """Time until the rebounds of a contact end after an impact, if they are summed; 0 if they are not, or are none."""
+    """Time, s, until the rebounds of a contact end, if they are to be summed; else 0."""
     if tried.status != RUNNING or not tried.rebounds[contact - 1]:
         return 0.0
     falls = _falls(scene, tried.mode, t, tried.state, tried.motion, contact)
@@ -520,7 +529,10 @@ def _rebounds_end(scene, tried, t, contact):
 
 @inlined
 def _time_of_rebounds(falls, speed, e, most):
-    """Time until rebounds end in which the gap falls so, if it could not grow to `most`, m, by then; 0 if it can."""
+    """Time, s, until rebounds end; 0 if the gap could grow to `most`, m, before.
+
+    `falls` is the acceleration of the gap, m/s^2, `speed` that of the first rebound, m/s, `e` the restitution.
+    """
     if not falls > 0.0 or e >= 1.0:
         return 0.0
     time = 2.0 * speed / (falls * (1.0 - e))
@@ -551,7 +563,10 @@ def _rocking_ends(scene, mode, t, tried):
 
 @inlined
 def _last_rebounds_end(scene, mode, t, y, motion, contact, speed):
-    """Time until the rebounds of a contact end that hits with a speed which friction forbids; 0 if they go on."""
+    """Time, s, until rebounds end that friction forbids, if they are to be summed; else 0.
+
+    `speed` is that of the hit, m/s.
+    """
     # Where the rebounds of both contacts shrink together, those of one are summed while the other one is still open,
     # which hits before they would be over.
     event = mode.contacts.event
@@ -562,7 +577,7 @@ def _last_rebounds_end(scene, mode, t, y, motion, contact, speed):
 
 @inlined
 def _next(scene, t, motion, mode, impact, event):
-    """Status, mode and state after an impact; `motion` is that after it, `mode` the one before."""
+    """Status, mode and state after an impact; `motion` is that after it, `mode` that before."""
     body, balls = scene.closed.body, scene.balls
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     (first, second), touched, are_open, found = impact
@@ -618,7 +633,7 @@ def _next(scene, t, motion, mode, impact, event):
 
 @inlined
 def _close(scene, t, psi, v, turned, event):
-    """Status, mode and state after all contacts have closed."""
+    """Status, mode and state after all contacts have closed, at the angle psi (rad) and with the slip v (m/s)."""
     status, mode, v = mode_at(ring_of(scene, turned), t, psi, v)
     mode = with_contacts(mode, Contacts(NONE, turned, 0, 0, event))
     return _after_closed(scene, t, (status, mode, state_when_closed(psi, v, turned)), 2, True)
