@@ -7,6 +7,11 @@ is the period of the motion if each later lap returns too. After a lap that does
 count as equal: a motion that only comes near its past is not taken for a periodic one.
 
 The place x of the body is a displacement, or an angle on a ring; lengths in m are then angles in rad.
+
+Throughout, `c` is a :class:`Cycles`, `swing` the distance between the extremes of a cycle, and `fast` the velocity
+that belongs to it: ``2 pi`` times the swing over the natural period, m/s. `forced` says that something excites the
+motion, `growth` is the largest exponent and its error, 1/s. The records of the belt and of the ring call these
+functions at each observation, and at the end of a run.
 """
 
 from __future__ import annotations
@@ -204,7 +209,7 @@ _MOST_CYCLES = 64.0
 
 @feature("x - other", of=(Ring, BristleRing), absorb=True)
 def difference(scene, x, other):
-    """Difference of two places of the body, m or rad; on a ring without full turns."""
+    """Difference of two places of the body, m or rad; on a ring less whole turns, so from -pi to pi."""
     apart = x - other
     return apart - 2.0 * pi * floor(apart / (2.0 * pi) + 0.5)
 

@@ -2,6 +2,9 @@
 
 They are the same on the ring and on the belt, with bristles and without. The state is the place and the velocity in
 space, and the deflection of each bundle of bristles.
+
+Read :mod:`ringsweep.models.interface.constant_step` first. `before` and `now` are an :class:`Inspection` each, at
+both ends of a step of length `h`. All numbers may be vector lanes.
 """
 
 from __future__ import annotations
@@ -130,7 +133,7 @@ def inspection(scene, y, place, forcing, angle):
 
 @unrolled
 def _creep(count, bristles, by_z, slope):
-    """Trace and determinant of sliding with its bristles; an empty tuple without bristles."""
+    """Field ``creep`` of an :class:`Inspection`; `by_z` are derivatives by the deflections, `slope` that by v."""
     if count == 0:
         return ["return ()"]
     decay = "-bristles[0].rate_z" if count == 1 else "max(-bristles[0].rate_z, -bristles[1].rate_z)"

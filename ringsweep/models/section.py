@@ -1,6 +1,9 @@
 """Sections of a motion: its last states at each period of the forcing, or at each turn of the displacement.
 
 The points of a run lie in the last columns of its row of outcomes, which are a ring buffer until the run ends.
+
+Records of models call these functions. `asked` is the field ``section`` of the scene, an empty tuple if none is asked
+for; then nothing of this file is compiled. `r` is the record before an observation, `p` its :class:`Points`.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from ringsweep.quantities.parameters import Leaf
 
 
 class Asked(NamedTuple):
-    """What a scene asks for.
+    """Field ``section`` of a scene that asks for points of its motion.
 
     Attributes
     ----------
@@ -107,7 +110,7 @@ def lent(asked, record, row, deflections):
 
 @feature("inf")
 def next_point(asked, record):
-    """Time that a step must show the record, s; infinite if there is none."""
+    """Time at which a step must show the record a point, s; infinite for points at turns, or without a section."""
     return inf if asked.at_turn else record.cycles.next
 
 

@@ -1,4 +1,9 @@
-"""What a body on a ring and a body on a belt have in common. A belt is kinematically a ring of radius 1."""
+"""What a body on a ring and a body on a belt have in common. A belt is kinematically a ring of radius 1.
+
+`motion` is what :func:`ringsweep.physics.ring.acceleration` takes: sine and cosine of the angle and angular velocity
+on a ring; displacement, force and velocity on a belt. `forcing` begins with place, velocity and acceleration of the
+drive.
+"""
 
 from __future__ import annotations
 
@@ -155,7 +160,7 @@ def of_balances(scene, friction, normals, motion, forcing, rate, scales):
 
 @hook
 def audited(scene, mode, forcing, y):
-    """What the audit looks at, of a body on bristles.
+    """Slip, size of the terms of the acceleration, and violation found so far, of a body on bristles.
 
     Returns
     -------

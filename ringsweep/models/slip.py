@@ -2,6 +2,10 @@
 
 They are the same on the ring and on the belt, with bristles and without. The place in an implicit step is relative to
 the drive, so that no large numbers cancel in slow creep.
+
+Read :mod:`ringsweep.models.interface.implicit` first: `x`, `common` and `forcing` are described there. A model gives
+:func:`slip` and :func:`region_guards`; all else follows from the :class:`Slip` that they return, which is called
+`now`.
 """
 
 from __future__ import annotations
@@ -63,7 +67,7 @@ class Slip(NamedTuple):
 
 @absorbed
 def bundled(law, coefficients, v, z, sign, region):
-    """K of a bundle of bristles, its derivative by the sliding velocity, s/m, and the :class:`Bundle`.
+    """``(K, dK/dv, Bundle)`` of the bristles at one contact; K in 1, its derivative in s/m.
 
     `coefficients` are the static and the kinetic one; see :func:`ringsweep.physics.friction.presliding.bristle`.
     """

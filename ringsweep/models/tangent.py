@@ -1,4 +1,10 @@
-"""Growth of small disturbances of a motion: Floquet multipliers of a lap, and the Lyapunov exponent."""
+"""Growth of small disturbances of a motion: Floquet multipliers of a lap, and the Lyapunov exponent.
+
+A *lap* is one period of the motion, see :mod:`ringsweep.models.cycles`; a *block* is a stretch of time over which
+growth is averaged, so that the scatter of the blocks gives the error. A matrix is a tuple, row by row; `vector` in
+the helpers gives only the length of a row. Records of models call :func:`undisturbed`, :func:`enter`,
+:func:`advance`, :func:`switched` and :func:`observed` in this order.
+"""
 
 from __future__ import annotations
 
@@ -129,7 +135,7 @@ _with_gradient = replacing("gradient")
 
 @unrolled
 def _product(length, vector, a, b):
-    """Product of two matrices, row by row; the length of `vector` is the number of rows."""
+    """Product of two square matrices; `vector` has as many numbers as they have rows."""
     n = range(length)
     entries = (" + ".join(f"a[{i * length + k}] * b[{k * length + j}]" for k in n) for i in n for j in n)
     return ["return " + ", ".join(entries)]
@@ -137,14 +143,14 @@ def _product(length, vector, a, b):
 
 @unrolled
 def _applied(length, vector, a):
-    """Product of a matrix and a vector."""
+    """Product of the matrix `a` and a vector."""
     n = range(length)
     return ["return " + ", ".join(" + ".join(f"a[{i * length + k}] * vector[{k}]" for k in n) for i in n)]
 
 
 @unrolled
 def _unit(length, vector):
-    """Unit matrix."""
+    """Unit matrix with as many rows as `vector` has numbers."""
     return ["return " + ", ".join(f"{float(i == j)}" for i in range(length) for j in range(length))]
 
 
@@ -176,7 +182,7 @@ def _saltation(length, gradient, before, after, keeps):
 
 @inlined
 def log_size(x):
-    """Natural logarithm; that of 0 is minus infinity."""
+    """Natural logarithm of the size of a disturbance; that of 0 is minus infinity."""
     return log(x) if x > 0.0 else -inf
 
 
@@ -319,14 +325,17 @@ def observed(tangent, scene, before, cycles, t, duration):
 
 @inlined
 def _change(rate, earlier, change):
-    """Change of a rate, 1/s, after a lap in which it was `change`, NaN before the second one."""
+    """Field ``change_1`` or ``change_2`` of :class:`Multipliers`: from the rates of two laps, and the `change` before."""
     now = abs(rate - earlier) if rate != earlier else 0.0
     return max(now, 0.5 * change) if change < inf else now
 
 
 @inlined
 def _multipliers(vector, flow, share, period, earlier):
-    """Multipliers of a motion of this period, s, of which the flow covers one over `share` laps."""
+    """Multipliers of a motion of this period, s.
+
+    `flow` covers ``1/share`` laps; `earlier` are the multipliers of the lap before.
+    """
     first, second, log_1, log_2, angle_1, angle_2 = _eigenvalues(vector, flow.matrix, flow.log_determinant)
     rate_1, rate_2 = share * log_1 / period, share * log_2 / period
     if share != 1.0:

@@ -1,4 +1,7 @@
-"""Intervals between two observations, and turns of the displacement within them."""
+"""Intervals between two observations, and turns of the displacement within them.
+
+`last` and `now` have the fields ``t``, ``x`` and ``velocity``; both may hold vector lanes.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +41,7 @@ def turn_within(last, now):
 
 @absorbed
 def between(last, now, share):
-    """Displacement at a share of an interval: the cubic through displacements and velocities at both ends."""
+    """Place at the share of an interval, from 0 to 1: the cubic through places and velocities at both ends."""
     rest = 1.0 - share
     ends = (1.0 + 2.0 * share) * rest * rest * last.x + share * share * (3.0 - 2.0 * share) * now.x
     return ends + share * rest * now.duration * (rest * last.velocity - share * now.velocity)

@@ -48,13 +48,13 @@ _with_acceleration = replacing("acceleration")
 
 @feature("()")
 def at_launch(seen):
-    """Shocks at the beginning of a run, from what a method shows: an empty tuple unless it locates events."""
+    """Shocks at the beginning of a run; an empty tuple unless the method locates events, as `seen` then tells."""
     return Shocks(seen.acceleration, 0.0, 0.0, nan)
 
 
 @feature("shocks", absorb=True)
 def without_event(shocks, seen):
-    """Shocks after one more observation."""
+    """Shocks after an observation within a mode, where the acceleration does not jump."""
     return _with_acceleration(shocks, seen.acceleration)
 
 

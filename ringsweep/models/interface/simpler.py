@@ -12,7 +12,7 @@ class Whole(NamedTuple):
 
 
 class Parted(NamedTuple):
-    """Scenes some of whose modes are those of a simpler scene, which takes the steps there."""
+    """Scenes some of whose modes are those of a simpler scene, which takes the steps in these modes."""
 
 
 @hook(optional=True)
@@ -28,7 +28,7 @@ def is_simpler(scene, mode):
 
 @hook
 def part(scene, record, mode, y):
-    """Simpler scene, and record and state there."""
+    """The simpler scene, its record, and its state."""
 
 
 @hook

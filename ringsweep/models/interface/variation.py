@@ -44,7 +44,7 @@ class Exponent(NamedTuple):
 
 @feature("()", of=(Belt, BristleBelt, Ring))
 def asked(scene):
-    """What a scene asks for: :class:`Exponent`, or an empty tuple."""
+    """Field ``asked`` of a scene: an :class:`Exponent`, or an empty tuple if no exponent is asked for."""
     return scene.asked
 
 
