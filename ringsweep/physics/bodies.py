@@ -4,6 +4,10 @@ The balances are equations between these symbols, besides the fields of the body
 acceleration, which its :class:`Coordinate` names, the normal reactions ``N1`` and ``N2``, and the friction ``K1`` and
 ``K2`` per unit of each reaction. They are linear in acceleration, ``N1`` and ``N2``; K occurs only in ``K1*N1`` and
 ``K2*N2``. The last one is the balance along the motion: it has the acceleration.
+
+`whole` is the determinant of the balances: each unknown is a polynomial over it. Methods that return a text or a list
+of texts return source code, see :mod:`ringsweep.numerics.balances`; :func:`ringsweep.physics.ring.body` calls them
+when a body is declared, never during a run.
 """
 
 from __future__ import annotations

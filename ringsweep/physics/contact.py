@@ -25,6 +25,9 @@ along the race are
     \\ddot g = \\ddot g_0 + \\Bigl(\\frac1M + \\frac{\\xi^2 \\sin^2\\beta}{J}\\Bigr) N + s c F, \\qquad
     \\ddot x = \\ddot x_0 + s c N + \\Bigl(\\frac1M + \\frac{\\lambda^2}{J}\\Bigr) F, \\qquad
     c = \\frac{\\xi \\lambda \\sin\\beta}{J},\\ \\lambda = R - \\xi \\cos\\beta .
+
+m1 and m2 are static coefficients, ``at_zero`` are N1, N2 and F1 at F_2 = 0, ``by_F2`` their derivatives by F_2.
+Models call :func:`at_rest` and :func:`sliding` at events.
 """
 
 from __future__ import annotations
@@ -170,14 +173,14 @@ def loads_as_stick_ends(body, m1, m2, motion, epsilon, first):
 
 @inlined
 def at(F2, at_zero, by_F2):
-    """Reactions N_1 and N_2, and friction of both contacts together, N, at a friction F_2."""
+    """``(N_1, N_2, F)`` at the friction F_2, N; F is that of both contacts together."""
     (N1, N2, F1), (by_N1, by_N2, by_F1) = at_zero, by_F2
     return N1 + by_N1 * F2, N2 + by_N2 * F2, F1 + (1.0 + by_F1) * F2
 
 
 @inlined
 def _holds(m1, m2, F2, at_zero, by_F2):
-    """Whether the reactions press, and hold a body at rest that needs this friction."""
+    """Whether a state of stick is admissible: both reactions press, and friction does not exceed its bound."""
     N1, N2, friction = at(F2, at_zero, by_F2)
     return N1 > 0.0 and N2 > 0.0 and abs(friction) <= m1 * N1 + m2 * N2
 

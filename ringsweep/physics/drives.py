@@ -156,7 +156,7 @@ def amplitude(drive):
 
 @hook(absorb=True, optional=True)
 def time_for(drive, t):
-    """The time, s, as the functions of a drive take it.
+    """Time as the other functions of a drive take it, s: a number, or an :class:`Instant` for a table or a formula.
 
     By default a number, where `t` may be an :class:`ringsweep.numerics.clock.Instant`; a table and a formula take both.
     """
@@ -580,7 +580,7 @@ def add_drive(name: str, drive: type) -> None:
 
 @inlined
 def _time_of(distance, first, second):
-    """Time in which an expression with these two derivatives changes by a distance."""
+    """Time, s, in which a function with the derivatives `first` and `second` changes by `distance`."""
     rate = abs(first) + sqrt(first * first + 2.0 * abs(second) * distance)
     return 2.0 * distance / rate if rate > 0.0 else inf
 
@@ -763,7 +763,7 @@ __getattr__ = _DEFINITIONS.find
 
 
 def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np.float64]) -> Any:
-    """Drives of cells, from their parameters of shape ``(cells,)``.
+    """Drives by formula, of shape ``(cells,)``, with their knots; `columns` are parameters by name, `spans` in s.
 
     Raises
     ------

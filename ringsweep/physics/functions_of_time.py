@@ -2,6 +2,8 @@
 
 The text is that of friction laws (:mod:`ringsweep.physics.friction.formula`) with the time ``t``, s, in place of the
 speed, and with ``sin``, ``cos`` and ``tan``. A *knot* is a time at which a formula switches between two expressions.
+
+`values` are the parameters by name, of shape ``(cells,)``. Nothing here runs in kernels.
 """
 
 from __future__ import annotations
@@ -283,7 +285,7 @@ def common_period(a: Any, b: Any) -> Any:
 
 @cache
 def size_at_start(node: Node) -> Node:
-    """Bound on the sizes of the terms of an expression at t = 0; its rounding scales with it."""
+    """Expression of a bound on the terms of `node` at t = 0; the rounding of its value scales with it."""
     if not node.varies:
         return _magnitude(node)
     if node.kind in ("sin", "cos"):

@@ -14,6 +14,9 @@ The impact law is Newton's with Moreau's complementarity (Moreau 1988; Glocker 2
 
 where the velocities follow from the impulses by momentum and moment of momentum. The modes of the contacts (open, slip
 in each direction, stick: at most 16) are tried one by one.
+
+`opening` of a contact is the rate of its gap, m/s. A *row* has the changes of one velocity by unit impulses: inwards
+and along the race at contact 1, then at contact 2. :mod:`ringsweep.models.ring.impact.switch` calls :func:`impulses`.
 """
 
 from __future__ import annotations
@@ -227,7 +230,7 @@ def _couplings(mass, moment, a, b):
 
 @inlined
 def _change(row, impulses):
-    """Change of a velocity by impulses inwards and along the race at contact 1, and at contact 2."""
+    """Change of a velocity, m/s, by the impulses (N1, T1, N2, T2), N s, from its row."""
     return row[0] * impulses[0] + row[1] * impulses[1] + row[2] * impulses[2] + row[3] * impulses[3]
 
 
@@ -239,7 +242,10 @@ def _largest(row):
 
 @inlined
 def _by_unknowns(row, k_1, k_2, sticks_1):
-    """Change of a velocity by the normal impulses, with friction k of each, and by that of a contact that sticks."""
+    """Changes of a velocity by N1, N2, and the impulse along the race of the contact that sticks.
+
+    `k_1` and `k_2` are friction per normal impulse of a contact that slips, 0 of one that sticks.
+    """
     return row[0] + k_1 * row[1], row[2] + k_2 * row[3], row[1] if sticks_1 else row[3]
 
 
@@ -277,7 +283,7 @@ def _solved(m, right):
 
 @inlined
 def _shared_stick(mu, couplings, wanted, scale):
-    """Impulses that stop both contacts, which is three conditions on four impulses: (found, N1, T1, N2, T2).
+    """Impulses that stop both contacts: ``(found, N1, T1, N2, T2)``, inwards and along the race, N s.
 
     `wanted` are the changes of opening and slip at contact 1 and of opening at contact 2. The impulses that give them
     form a line. The cones of friction leave an interval of it, whose middle is taken, or nothing.

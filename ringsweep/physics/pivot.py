@@ -14,6 +14,9 @@ Momentum, radial and tangential, and moment of momentum about the centre of mass
 and a fourth equation: ``F = K N`` in slip; ``\\rho \\ddot\\alpha + r \\ddot\\psi = R \\ddot\\theta`` in stick. They are
 linear in the unknowns: both accelerations, N and F. So their derivatives along a change of the motion, and the
 coefficients of their power series, are the same equations with other right sides.
+
+`f` is the :class:`Frame`. A solution is a tuple in the order of UNKNOWNS; a change of the motion one in the order of
+MOTION.
 """
 
 from __future__ import annotations
@@ -90,7 +93,7 @@ _REST = "rest_0", "rest_1", "rest_2", "rest_3"
 
 
 def _function(found: Sequence[Polynomial], whole: Polynomial = ONE, **arguments: Iterable[str]) -> Any:
-    """Function of a frame and of `arguments`, which are numbers or tuples of symbols: polynomials over `whole`."""
+    """Make a function of a frame and of `arguments`, numbers or tuples, that returns `found`, each over `whole`."""
     source = Source(Frame._fields, ("K",))
     source.begin(plain=True)
     values = ", ".join(source.quotient(p, whole) for p in found)
@@ -145,7 +148,7 @@ sliding_acceleration = _function([_STICK], solution=UNKNOWNS, carried=["carried"
 
 @inlined
 def load(f):
-    """Normal reaction if psi is not accelerated, N."""
+    """Normal reaction that the radial balance needs if psi is not accelerated, N; positive if the contact presses."""
     return imbalance(f, NOTHING)[0]
 
 
@@ -157,11 +160,11 @@ def size(f):
 
 @inlined
 def in_slip(f, K):
-    """Solution in slip."""
+    """Accelerations of psi and alpha (rad/s^2), normal reaction and friction (N) in slip with friction K."""
     return solved_in_slip(f, K, (*imbalance(f, NOTHING), 0.0))
 
 
 @inlined
 def in_stick(f, carried):
-    """Solution in stick, while the race has the acceleration `carried`, m/s^2."""
+    """Accelerations of psi and alpha (rad/s^2), normal reaction and friction (N) in stick; `carried` in m/s^2."""
     return solved_in_stick(f, (*imbalance(f, NOTHING), -carried))

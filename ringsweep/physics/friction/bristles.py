@@ -2,6 +2,9 @@
 
 Stiffness and damping are per unit of the normal load: 1/m and s/m. :mod:`ringsweep.physics.friction.presliding`
 describes the functions of a law.
+
+All functions take vector lanes too. `sign` is the direction of the slip, 1.0 or -1.0; `region` is BAND in presliding
+and KINETIC in slip.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Speeds at which the expression of a friction law switches, and numbers that are found once for each cell.
 
 All are isolated by interval arithmetic, see :mod:`ringsweep.numerics.isolation`: no feature of a law is too narrow.
+
+A *row* is a cell on one of its surfaces: cells vary fastest. A *threshold* is a speed at which the formula switches.
+Nothing here runs in kernels: models call :func:`hidden_fields` and :func:`table_fields` as they build cells.
 """
 
 from __future__ import annotations
@@ -440,7 +443,7 @@ class _Finder:
 
 
 def _places(row: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Place of each number among those of the same row; rows ascend."""
+    """Place of each row number among those that are equal to it; they ascend."""
     return np.arange(len(row)) - np.searchsorted(row, row)
 
 

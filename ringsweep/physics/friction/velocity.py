@@ -7,6 +7,9 @@ which the expression is analytic. Regions are numbered from slow to fast. In the
 *stiction band*, a contact counts as stuck.
 
 *Surfaces* are the coefficients of the surfaces under the contacts, ``(mu_s, mu_k, mu_s, mu_k, ...)``.
+
+A function with ``@_derived`` is written with the arguments ``expression, count, lanes`` in front; callers pass only
+those behind: the law, and for example a speed (m/s) and the surfaces. `count` is the length of `surfaces`.
 """
 
 from __future__ import annotations
@@ -116,7 +119,7 @@ PIECE = 5
 
 @inlined
 def _row_at(pieces, speed):
-    """Row of the cubic at a speed."""
+    """Row of the table of cubics that holds a speed, m/s."""
     low, high = 0, pieces.shape[0]
     while high - low > 1:
         middle = (low + high) // 2
@@ -370,7 +373,7 @@ def passes_band(law, before, after, ahead):
 
 @_derived
 def leaps(expression, count, lanes, law, slow, fast):
-    """Whether a whole region of a law, with a bound on both sides, lies between two speeds, m/s."""
+    """Whether a whole bounded region lies between the speeds `slow` and `fast`, m/s: a step would jump over it."""
     edges = 0 if expression.tabulated else len(expression.thresholds) + expression.has_band
     within = [f"((slow < law.edges[{i}]) & (law.edges[{i + 1}] <= fast))" for i in range(edges - 1)]
     return ["return " + (" | ".join(within) or "slow > inf")]
