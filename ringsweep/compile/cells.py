@@ -3,6 +3,9 @@
 A cell holds dozens of numbers. If it were passed by value, Numba would unpack it and pack it again in every call, which
 would be half of the code that LLVM has to optimise. A reference is one pointer. In kernels it looks like the tuple:
 attributes, indices and unpacking load a number, and a ``NamedTuple`` within it is again a reference.
+
+Functions with the arguments ``context, builder, ...`` write LLVM code; Numba calls them. `offset` is in bytes. Python
+makes a :class:`Cells` from a batch; kernels read its cells with ``take(batch, i)``.
 """
 
 from __future__ import annotations
@@ -77,7 +80,7 @@ def _leaves(batch: Any) -> Iterator[Any]:
 
 
 def _with_whole_rows(leaf: Any) -> Any:
-    """Array of floats whose rows are contiguous; all of them may be the same row."""
+    """Float array with contiguous rows; a broadcast row (stride 0) is allowed."""
     leaf = np.asarray(leaf, dtype=np.float64)
     return leaf if len(leaf) and leaf[0].flags.c_contiguous else np.ascontiguousarray(leaf)
 

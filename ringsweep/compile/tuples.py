@@ -1,4 +1,8 @@
-"""Functions of nested tuples in kernels: their code is generated for the types or the length of an argument."""
+"""Functions of nested tuples in kernels: their code is generated for the types or the length of an argument.
+
+A function that is *generated* is given the Numba types of its arguments when a kernel is compiled. It returns the
+lines of its body, or the function to use.
+"""
 
 from __future__ import annotations
 

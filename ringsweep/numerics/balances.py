@@ -4,6 +4,10 @@ An equation is a text such as ``mass*radius*phi_dd = -mass*gravity*sin_phi + K1*
 unknowns are found by Cramer's rule, whose determinants are polynomials again, so that derivatives and power series of
 the solution follow. In the source code a factor that depends on parameters only is a constant of the body: it is
 computed once.
+
+A *monomial* is a tuple of names with their powers; a :class:`Polynomial` maps monomials to numbers.
+:mod:`ringsweep.physics.bodies` and :mod:`ringsweep.physics.pivot` call this file when a body is declared, never
+during a run.
 """
 
 from __future__ import annotations
@@ -202,7 +206,7 @@ class Source:
         return self.name(f"{self.value(p)} * {inverse}")
 
     def value(self, p: Polynomial) -> str:
-        """Name of the value of a polynomial."""
+        """Name of the value of a polynomial, which is computed once."""
         groups: dict[Any, list[tuple[str, dict[Monomial, Polynomial], Polynomial]]] = {}
         for monomial, rest in sorted(p.parts(p.symbols - self.fields - self.inner).items()):
             row = rest.parts(self.inner)

@@ -1,6 +1,8 @@
 """Transition matrices of linear equations ``dw/dt = J(t) w`` by collocation at the nodes of Radau.
 
 With n nodes the method is of order 2n - 1. It is L-stable: a mode that decays within a step is gone after it.
+
+`work` is an array of rows: :func:`store` puts the Jacobians there, :func:`transition` replaces them by the result.
 """
 
 from __future__ import annotations
@@ -101,7 +103,10 @@ def transition(n, h, weights, work):
 
 @inlined
 def _eliminate(size, columns, work):
-    """Solve a system of equations in the first rows; the solutions replace its right sides."""
+    """Solve `size` linear equations: the first rows of `work`, whose other columns up to `columns` are right sides.
+
+    Gauss's elimination with row pivoting. The solutions replace the right sides; the matrix is lost.
+    """
     for p in range(size):
         best = p
         for i in range(p + 1, size):

@@ -128,7 +128,7 @@ _HALF_PI_1, _HALF_PI_2, _HALF_PI_3 = map(
 
 
 def lanes_body(scalar: Any) -> Any:
-    """Decorator of the body for Lanes of a function of numbers, `scalar`."""
+    """Decorator: the function is the form of `scalar` for vector lanes, which kernels call for Lanes and Mask."""
 
     def register(lanes: Any) -> Any:
         specialise(scalar, lambda *kinds: lanes if LANES in kinds or MASK in kinds else scalar)

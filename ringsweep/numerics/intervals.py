@@ -6,6 +6,10 @@ R. B. Kearfott, M. J. Cloud, Introduction to Interval Analysis (SIAM, 2009).
 
 Derivatives are those of the power series in the speed: coefficient `k` of a function on an interval bounds its `k`-th
 derivative divided by k!.
+
+None in place of an interval is zero, exactly. `partial` marks intervals on a part of which the function is not
+defined. A series is a list of intervals, from the value up. :mod:`isolation` calls :class:`Enclosure`; nothing here
+runs in kernels.
 """
 
 from __future__ import annotations
@@ -144,7 +148,7 @@ _exp, _tanh, _atan = _monotone(np.exp, 0.0), _monotone(np.tanh, -1.0, 1.0), _mon
 
 
 def _on_domain(a: Interval) -> tuple[Any, Any, Any]:
-    """Part of an interval that is not negative, and where the rest is cut off."""
+    """Both bounds of the part of an interval that is not negative, and its mark `partial`."""
     cut = a.low < 0.0
     low = np.where(a.high < 0.0, np.nan, np.maximum(a.low, 0.0))
     return low, np.where(a.high < 0.0, np.nan, a.high), _either(a.partial, cut if cut.any() else None)
@@ -293,7 +297,7 @@ _VALUES = {"exp": _exp, "tanh": _tanh, "atan": _atan, "sqrt": _sqrt, "log": _log
 
 
 def _among(node: Node, known: Mapping[Node, Series], order: int) -> Series:
-    """Power series of an expression of nodes that have series, up to a power that all of them have."""
+    """Power series of an expression whose nodes `known` have series, up to the power `order`."""
     if node in known:
         return known[node][: order + 1]
     if node.kind == "number":
@@ -452,7 +456,7 @@ class Enclosure:
 
 
 def _horner(coefficients: list[Interval | None], speed: Interval, order: int) -> Series:
-    """Power series of a polynomial of the speed."""
+    """Power series of a polynomial of the speed, of order `order`, by Horner's rule; None is a coefficient 0."""
     x = ([speed, exact(1.0)] + [None] * order)[: order + 1]
     found: Series = [None] * (order + 1)
     for coefficient in reversed(coefficients):

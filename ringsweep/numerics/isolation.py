@@ -2,6 +2,9 @@
 
 An interval of the speed is decided if the bounds on the function exclude zero, or if those on its derivative do: then
 its values at both ends tell all. Other intervals are halved. So no feature is missed, however narrow it is.
+
+A *row* is a set of parameters of the law. Nothing here runs in kernels: :mod:`ringsweep.physics.friction.speeds`
+calls it once for each set of parameters.
 """
 
 from __future__ import annotations
@@ -135,7 +138,7 @@ def _joined(parts: list[Cells]) -> Cells:
 
 
 def _at(enclosure: Enclosure, cells: Cells, speed: NDArray[np.float64], k: int) -> Interval:
-    """Coefficient `k` at one speed of each interval, on its side of all switches."""
+    """Coefficient `k` of the series of a function at one speed of each cell, m/s, on the side of the cell."""
     found = enclosure(cells.row, speed, speed, cells.low, k)[k]
     return _filled(found, len(speed))
 
@@ -153,7 +156,7 @@ def _whole(found: Interval) -> NDArray[np.bool_]:
 
 
 def _centred(point: Interval, rate: Interval, cells: Cells, middle: NDArray[np.float64]) -> Interval:
-    """Bounds on a function by its value at a speed and its derivative."""
+    """Bounds on a function by the mean value theorem: its value at `middle` and bounds on its rate."""
     return add(point, multiply(rate, add(Interval(cells.low, cells.high), exact(-middle))))
 
 

@@ -3,6 +3,8 @@
 ``rk4`` puts one number of each of several runs side by side; power series put their terms side by side, see
 :mod:`ringsweep.numerics.terms`. The processor computes 32 doubles by four instructions of 512 bits. They are
 independent, so it need not wait for one result before it computes the next: a step is one long chain of results.
+
+Functions whose arguments are ``context, builder, sig, args`` write LLVM code; Numba calls them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Nested tuples of numbers in arrays: one run, or several runs side by side in vector lanes.
 
 A tuple may also hold arrays that all runs share. They are not stored: runs take those of another tuple of the type.
+
+Number k of a tuple is at ``at + k * stride``. ``rk4`` keeps its runs so; records use :func:`select_all`.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH, loader, storer
 
 
 def _numbers(kind: Any, name: str) -> list[tuple[str, Any]]:
-    """Expressions for the numbers of a nested tuple with the name `name`, in order, and their Numba types."""
+    """``(text, type)`` of each number of a nested tuple called `name`, in order."""
     if isinstance(kind, types.BaseTuple):
         parts: list[Any] = list(iter(kind))  # type: ignore[call-overload]
         return [number for k, part in enumerate(parts) for number in _numbers(part, f"{name}[{k}]")]

@@ -1,6 +1,9 @@
 """Power series within a step: evaluation, size of the step, roots.
 
 A series is an array of coefficients: ``c[0] + c[1] s + c[2] s^2 + ...`` with s the time since the step began.
+
+`h` is the length of a step, s. ORDER is the highest power. `work` is an array of shape ``(STACK, columns)`` whose
+contents may be lost; instants are stored in ``work[0]``.
 """
 
 from __future__ import annotations
@@ -113,7 +116,10 @@ def variation(c, h):
 
 @inlined
 def bounds_within(c, h):
-    """Bounds on the values of a series within a step of length `h`: those of the first three terms, and the rest."""
+    """Lower and upper bound on a series within a step of length `h`, s.
+
+    The extremes of the first three terms are exact; the others count with their magnitudes.
+    """
     rest = h * total(abs(terms(c)) * powers(h) * numbers_from(_ABOVE, 0))
     linear, square = c[1] * h, c[2] * h * h
     turn = end = linear + square

@@ -3,6 +3,9 @@
 In a kernel the terms of the powers 1 ... ORDER of a series are one vector, so that a sum over them takes a few
 instructions. A product of two series cannot be computed at once where its coefficients appear one after another, as in
 the solution of a differential equation. But several products can grow side by side, one in each lane.
+
+Functions named ``..._in_kernel`` write the code that kernels call in place of the Python function before them; an
+edit of one needs the same edit of the other. A *factor* is coefficient k of one of the two series of a product.
 """
 
 from __future__ import annotations

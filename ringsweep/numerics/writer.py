@@ -7,6 +7,10 @@ and ``rest``, see :mod:`ringsweep.numerics.clock`; sines and cosines of it call 
 In kernels an interval of the speed is known where a series is computed. There a switch is an ``if``, and only one side
 of it is computed. In vector lanes each lane may be on another side, so both sides are computed, except where no lane
 needs a side that calls functions.
+
+`writer` collects the lines; ``writer.known`` maps each node that is computed already to its name in the source.
+`side` and `threshold` are source texts with a place for the index of a threshold. Laws and drives call the public
+functions when their type is made.
 """
 
 from __future__ import annotations
@@ -460,7 +464,7 @@ SERIES_ROWS = 36
 
 @cache
 def _degree(node: Node) -> int | None:
-    """Degree of a polynomial; None for anything else."""
+    """Degree of a polynomial, at most :data:`_MOST_DEGREE`; None for a higher one and for anything else."""
     if not node.varies:
         return 0
     if node.kind == "variable":
