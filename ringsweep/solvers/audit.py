@@ -1,4 +1,9 @@
-"""Whether a run obeys its friction law at instants that the solver did not choose."""
+"""Whether a run obeys its friction law at instants that the solver did not choose.
+
+Only the solvers that locate events call it, after each step. `fraction` is a place within the step, from 0 to 1.
+Functions with the endings ``_in_series`` and ``_in_implicit_step`` are two forms of one, see
+:func:`ringsweep.solvers.steps.either`.
+"""
 
 from __future__ import annotations
 
@@ -46,13 +51,13 @@ _ALL_CHECKED, _CHECKED_SHARE = 8, 0.25
 
 @inlined
 def is_checked(n):
-    """Whether the law is checked in step `n`."""
+    """Whether the audit looks at step number `n` of a run: at all first steps, and at a share of the others."""
     return n <= _ALL_CHECKED or (n * 0.6180339887498949) % 1.0 < _CHECKED_SHARE
 
 
 @inlined
 def _ends(scene, step, scratch):
-    """Forcing and state of an implicit step at both its ends."""
+    """``((forcing, x), (forcing, x))`` at the beginning and at the end of an implicit step."""
     before = implicit.forcing(scene, scratch.course, step.now, 0.0)
     after = implicit.forcing(scene, scratch.course, step.now, step.s)
     return (before, implicit.to_implicit(scene, before, step.y)), (

@@ -3,6 +3,10 @@
 Within a mode a step uses a power series (:mod:`taylor`) or is implicit (:mod:`creep`). The family of the friction law
 decides which of them a kernel contains. Set-valued laws take series only. Laws with bristles take implicit steps only.
 Smooth laws take implicit steps where a mode relaxes much faster than it moves, and series elsewhere.
+
+Read :mod:`ringsweep.models.interface.modes` first. :func:`integrate` is what methods call; its loop takes one step
+with :func:`_step_in`, then :func:`_after_step` says which mode follows. `tolerances` are the relative errors allowed
+to a step of a series and to an implicit step; `guard` is the index of the guard that ended a step, or -1.
 """
 
 from __future__ import annotations
@@ -61,7 +65,7 @@ class LocalErrors(NamedTuple):
 
 @inlined
 def _after_creep(local, error):
-    """Local errors after one more implicit step."""
+    """Local errors after one more implicit step, whose :class:`LocalErrors` share is `error`."""
     return LocalErrors(local.series, local.rate, local.implicit + error)
 
 
@@ -133,7 +137,7 @@ def _step_by_series(family, scene, run, h_max, tolerances, scratch):
 
 @inlined
 def _goes_on(scene, run, guard, record):
-    """Record after a step under a smooth law: where no event ends the step nothing jumps, but the kind of step may."""
+    """Record after a step under a smooth law that no event ended: the next step may be of the other kind."""
     return recorder.after_event(scene, record, run.mode, run.mode, run.now.t) if guard < 0 else record
 
 
@@ -184,7 +188,7 @@ def _step_of_simpler_scene(kind, scene, run, h_max, tolerances, scratch):
 
 @hook
 def _begin_record(family, scene, mode, now, y, tolerances, c):
-    """Record at the beginning of a run."""
+    """Record at the beginning of a run, at `now` in the state `y` of a mode; fills the table `c` for series."""
 
 
 @_begin_record.implements(SetValued, Smooth)
@@ -225,7 +229,7 @@ _history_row = either(_row_of_series, _row_in_implicit_step)
 
 @inlined
 def _until(limit, now):
-    """Time from an instant to a later one, s."""
+    """Time from the instant `now` to the time `limit`, s."""
     return (limit - now.t) - now.rest
 
 

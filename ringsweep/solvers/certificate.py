@@ -1,4 +1,8 @@
-"""Comparison of two runs of a cell at different resolutions: whether they agree, and bounds on their errors."""
+"""Comparison of two runs of a cell at different resolutions: whether they agree, and bounds on their errors.
+
+`one`, `rows` are the runs that a dataset shows, `other`, `second_rows` the runs at the other resolution. All arrays
+have the cells as first dimension. Nothing here runs in kernels.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""One implicit step, up to the first guard that vanishes, in a mode that relaxes much faster than it moves."""
+"""One implicit step, up to the first guard that vanishes, in a mode that relaxes much faster than it moves.
+
+Read :mod:`ringsweep.models.interface.implicit` first: `x`, `forcing`, and *views*, which are ``(guards, motion)``.
+``scratch.bends[0]`` holds the dense output of the step that was taken; ``scratch.bends[1]`` may be overwritten. `g`
+is the index of a guard, `s` and `h` are lengths of steps, s.
+"""
 
 from __future__ import annotations
 
@@ -102,7 +107,7 @@ def _step_of_method(scene, start, course, h, end, bends):
 
 @inlined
 def _guard_after(scene, start, scratch, h, g):
-    """Value of guard `g` after a step of length `h`."""
+    """Value of guard `g` after a step of the method of length `h`, s."""
     end = implicit.forcing(scene, scratch.course, start.now, h)
     x_next, _ = _step_of_method(scene, start, scratch.course, h, end, scratch.bends[1])
     return implicit.guards_and_motion(scene, start.mode, start.common, end, x_next)[0][g]
@@ -217,7 +222,7 @@ def _first_event_by_samples(scene, start, scratch, taken, views):
 
 @inlined
 def _interpolate(samples, row):
-    """Fill `row` with the series of the polynomial through the values of a quantity, in fractions of the step."""
+    """Fill `row` with the polynomial, in fractions of the step, through `samples` at its equidistant instants."""
     for k in range(ORDER + 1):
         row[k] = 0.0
         if k <= INSTANTS:

@@ -2,6 +2,9 @@
 
 The method does not locate events. It steps across the edge of a zone, a reversal or the stiction band as if the
 equations were smooth. ``stiffness`` shows which runs exceed the limit of stability.
+
+Read :mod:`ringsweep.models.interface.constant_step` first. `now` is the inspection at the beginning of a step. WIDTH
+runs of a block advance side by side in vector lanes; `k` counts the steps of a stretch.
 """
 
 from __future__ import annotations
@@ -175,7 +178,7 @@ LIVE, FINISHED, ENDING, CHECKED = 1.0, 0.0, 2.0, -1.0
 
 
 class Diagnosed(NamedTuple):
-    """Stiffness, least margin and largest share of a zone are recorded for each run. Otherwise: an empty tuple."""
+    """Marks that a :class:`Diagnosis` of each run is made; an empty tuple in its place says that none is."""
 
 
 class Diagnosis(NamedTuple):
@@ -287,7 +290,7 @@ def _tabulate(table, drive, stretch):
 
 @absorbed
 def _step_by_rk4(scene, y, now, table, k, h):
-    """State one step after `y`, whose inspection is `now`; row `k` of `table` is the drive at the beginning."""
+    """State at the end of a step, by Runge-Kutta 4; row `k` of `table` is the drive at the beginning."""
     k1 = now.rates
     forcing = lookup(scene.drive, table, k + 1)
     k2 = constant_step.rates(scene, now, add_scaled(y, 0.5 * h, k1), forcing)
@@ -410,7 +413,7 @@ def prepare(batch: Any) -> tuple[Any, Any]:
 
 @kernel
 def _launch(batch, launches):
-    """Fill `launches` with the initial states."""
+    """Fill `launches`, one array for each component, with the initial states."""
     for cell in range(len(launches[0])):
         put(launches, cell, constant_step.initial_state(take(batch, cell)))
 

@@ -1,4 +1,7 @@
-"""What the steps of a run share: arrays to work in, and the step that was taken."""
+"""What the steps of a run share: arrays to work in, and the step that was taken.
+
+A *step* is a power series or implicit; the solvers of events, their audit and the history read it.
+"""
 
 from __future__ import annotations
 

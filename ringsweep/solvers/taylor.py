@@ -1,6 +1,9 @@
 """One step of a power series, up to the first guard that vanishes.
 
 The guards are power series on the same step. The first root of each is located to rounding, and no root is missed.
+
+Read :mod:`ringsweep.models.interface.series` first. ``run`` is the :class:`ringsweep.solvers.automaton.Run` before
+the step.
 """
 
 from __future__ import annotations
@@ -51,7 +54,7 @@ def _first_event_of_series(c, first, entry_guard, h, work):
 
 @inlined
 def _shared(run, s, h, reach):
-    """Error of a step, in units of the tolerance, if a run at a looser tolerance takes the same step; else 0.
+    """Error of a step for :class:`LocalErrors`: in units of the tolerance if a looser run takes the same step; else 0.
 
     The length of the step is `s`, without an event `h`; the tolerance allows the length `reach`, s.
     """

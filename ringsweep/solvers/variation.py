@@ -1,4 +1,8 @@
-"""The variational equation along the steps of a run; without anything asked for, nothing of it is compiled."""
+"""The variational equation along the steps of a run; without anything asked for, nothing of it is compiled.
+
+`asked` is :class:`ringsweep.models.interface.variation.Exponent`, or an empty tuple. The steps of ``taylor.py`` and
+``creep.py`` call these functions.
+"""
 
 from __future__ import annotations
 
