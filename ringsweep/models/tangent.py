@@ -325,7 +325,7 @@ def observed(tangent, scene, before, cycles, t, duration):
 
 @inlined
 def _change(rate, earlier, change):
-    """Field ``change_1`` or ``change_2`` of :class:`Multipliers`: from the rates of two laps, and the `change` before."""
+    """A ``change`` of :class:`Multipliers`, 1/s, from the rates of two laps and the `change` before."""
     now = abs(rate - earlier) if rate != earlier else 0.0
     return max(now, 0.5 * change) if change < inf else now
 
