@@ -52,6 +52,7 @@ class Cells:
     """
 
     def __init__(self, batch: Any) -> None:
+        """Copy the numbers of a batch, and the addresses of its longer arrays, into the block."""
         leaves = [leaf if leaf.ndim == 1 else _with_whole_rows(leaf) for leaf in _leaves(batch)]
         self.batch, self.layout = batch, _layout(batch)
         # The block holds the addresses of these arrays.
@@ -126,6 +127,7 @@ class CellsType(types.Type):
     """Numba type of :class:`Cells`: a pointer to the first cell."""
 
     def __init__(self, cell: Any) -> None:
+        """`cell` is the Numba type of a cell."""
         self.cell = cell
         super().__init__(f"cells of {cell}")
 
@@ -150,6 +152,7 @@ class Reference(types.BaseNamedTuple):
     """
 
     def __init__(self, value: Any) -> None:
+        """Take over the fields of the tuple `value`."""
         self.value, self.fields, self.instance_class, self.count = (
             value,
             value.fields,
@@ -171,12 +174,15 @@ class Reference(types.BaseNamedTuple):
         return [_WORD * sum(words[:k]) for k in range(len(words))]
 
     def __getitem__(self, k: Any) -> Any:
+        """Type of field `k`."""
         return self.types[k]
 
     def __len__(self) -> int:
+        """Number of fields."""
         return int(self.count)
 
     def __iter__(self) -> Iterator[Any]:
+        """Types of the fields."""
         return iter(self.types)
 
 

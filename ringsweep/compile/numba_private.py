@@ -45,6 +45,7 @@ class _CalleeLibrary(JITCodeLibrary):
     """Code of a function that kernels call: its text, until a kernel is made."""
 
     def __init__(self, codegen: Any, name: str) -> None:
+        """Numba calls it; no code is there yet."""
         CodeLibrary.__init__(self, codegen, name)
         self._linking_libraries: list[Any] = []
         self._text, self._shared_module = "", None
@@ -126,6 +127,7 @@ class _KernelLowering(NativeLowering):
     _name = "kernel_lowering"
 
     def run_pass(self, state: Any) -> bool:
+        """Write the code into a :class:`_KernelLibrary`."""
         state.library = _KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
@@ -138,6 +140,7 @@ class _CalleeLowering(NativeLowering):
     _name = "callee_lowering"
 
     def run_pass(self, state: Any) -> bool:
+        """Write the code into a :class:`_CalleeLibrary`, and give Numba an object by which callers find it."""
         state.library = _CalleeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         state.flags.no_compile = True
@@ -177,6 +180,7 @@ class _ArrayReleases(IRLegalization):
     _name = "array_releases"
 
     def run_pass(self, state: Any) -> bool:
+        """Do nothing in functions without reference counts."""
         models = state.targetctx.data_model_manager
         return any(_holds_arrays(models, kind) for kind in state.typemap.values()) and bool(super().run_pass(state))
 
@@ -186,6 +190,7 @@ class _Target(CPUContext):
 
     @cached_property
     def nrt(self) -> Any:
+        """Numba's interface to reference counts."""
         return _ReferenceCounts(self, self.enable_nrt)
 
 
@@ -313,6 +318,7 @@ class _KernelCompiler(CompilerBase):
     lowering: ClassVar[type] = _KernelLowering
 
     def __init__(self, typingctx: Any, *arguments: Any) -> None:
+        """Let Numba use this package's typing and target."""
         super().__init__(_typing(typingctx), *arguments)
         self.state.targetctx.__class__ = _Target
         self.state.targetctx.typing_context = self.state.typingctx
@@ -360,6 +366,7 @@ class _BorrowedModel(ArrayModel):
     """Memory of a borrowed array: that of an array whose count nobody looks at."""
 
     def contains_nrt_meminfo(self) -> bool:
+        """A borrowed array has no count."""
         return False
 
 

@@ -24,6 +24,7 @@ class Polynomial(dict[Monomial, float]):
     """Polynomial in any number of symbols: the factor of each product of symbols. Factors that vanish are left out."""
 
     def __init__(self, terms: Iterable[tuple[Monomial, float]] = ()):
+        """Sum of terms, each a monomial and its factor; terms that cancel are left out."""
         super().__init__()
         for monomial, factor in terms:
             self[monomial] = self.get(monomial, 0.0) + factor
@@ -31,22 +32,28 @@ class Polynomial(dict[Monomial, float]):
                 del self[monomial]
 
     def __add__(self, other: Any) -> Polynomial:
+        """Sum with a polynomial or a number."""
         return Polynomial([*self.items(), *_as_polynomial(other).items()])
 
     def __neg__(self) -> Polynomial:
+        """Negative."""
         return self * -1.0
 
     def __sub__(self, other: Any) -> Polynomial:
+        """Difference from a polynomial or a number."""
         return self + _as_polynomial(other) * -1.0
 
     def __rsub__(self, other: Any) -> Polynomial:
+        """A number less this polynomial."""
         return other + -self
 
     def __mul__(self, other: Any) -> Polynomial:
+        """Product with a polynomial or a number."""
         pairs = ((a, p, b, q) for a, p in self.items() for b, q in _as_polynomial(other).items())
         return Polynomial((_product(a, b), p * q) for a, p, b, q in pairs)
 
     def __pow__(self, power: int) -> Polynomial:
+        """Power with a whole exponent, 0 or more."""
         return self * self ** (power - 1) if power else ONE
 
     __radd__, __rmul__ = __add__, __mul__
@@ -179,6 +186,7 @@ class Source:
     """
 
     def __init__(self, fields: Sequence[str], inner: Sequence[str]):
+        """Begin a source without lines; `fields` are constant during a run, `inner` are factors kept apart."""
         self.fields, self.inner = frozenset(fields), frozenset(inner)
         self.constants: dict[Any, Polynomial] = {}
         self.begin()

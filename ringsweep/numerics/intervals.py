@@ -372,6 +372,7 @@ class Enclosure:
         values: Mapping[str, NDArray[np.float64]],
         thresholds: Sequence[NDArray[np.float64]] = (),
     ) -> None:
+        """Sort the nodes, and find those that do not depend on the speed, once."""
         self.output, self.thresholds = output, thresholds
         self.rows = len(next(iter(values.values()))) if values else 1
         found: dict[Node, Interval] = {}
@@ -393,6 +394,7 @@ class Enclosure:
 
     @staticmethod
     def _constant(node: Node, found: Mapping[Node, Interval], values: Mapping[str, NDArray[np.float64]]) -> Interval:
+        """Interval of a node that does not depend on the speed."""
         if node.kind == "number":
             return exact(node.value)
         if node.kind == "symbol":
@@ -432,6 +434,7 @@ class Enclosure:
         return [None if c is None else _for_each_cell(c, len(row)) for c in found]
 
     def _found(self, row: Any, low: Any, high: Any, side: Any, order: int) -> dict[Node, Series]:
+        """Power series of all nodes, with `order` + 1 coefficients; the arguments are those of a call."""
         found: dict[Node, Series] = {}
         empty: list[Interval | None] = [None] * order
         with np.errstate(all="ignore"):

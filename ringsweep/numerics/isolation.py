@@ -47,6 +47,7 @@ class UndecidedError(ArithmeticError):
     """
 
     def __init__(self, low: float, high: float):
+        """`low` and `high` are the bounds of the interval of the speed, m/s."""
         self.low, self.high = low, high
         super().__init__(f"undecided from {low:.6g} to {high:.6g} m/s")
 

@@ -36,6 +36,7 @@ class _Vector(types.Type):
     element: ClassVar[Any]
 
     def __init__(self, width: int) -> None:
+        """`width` is the number of lanes."""
         self.width = width
         super().__init__(f"{type(self).__name__}({width})")
 
@@ -61,6 +62,7 @@ class _VectorModel(models.PrimitiveModel):
     """Memory of a vector: an LLVM vector."""
 
     def __init__(self, dmm: Any, fe_type: Any) -> None:
+        """Numba calls it for each type of lanes."""
         super().__init__(dmm, fe_type, ir.VectorType(fe_type.element, fe_type.width))
 
 

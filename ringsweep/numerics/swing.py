@@ -44,12 +44,15 @@ class _Code:
     """Instructions that LLVM may fuse."""
 
     def __init__(self, builder: Any) -> None:
+        """Write with a builder of LLVM code."""
         self.builder = builder
 
     def times(self, a: Any, b: Any) -> Any:
+        """Product."""
         return self.builder.fmul(a, b, flags=("contract",))
 
     def plus(self, a: Any, b: Any) -> Any:
+        """Sum."""
         return self.builder.fadd(a, b, flags=("contract",))
 
     def sum_of_products(self, pairs: Any) -> Any:

@@ -107,6 +107,7 @@ class Equations:
         coordinate: Coordinate = ANGLE,
         absent: Collection[str] = (),
     ):
+        """Read the balances, and refuse what is not linear, not known, or has a name twice."""
         self.texts, self.contacts = tuple(balances), len(balances) - 1
         if self.contacts not in (1, 2):
             problem = "give two for one contact, or three for two contacts; is a comma missing?"

@@ -30,6 +30,7 @@ class Definitions:
     """
 
     def __init__(self, module: str, make: Callable[..., type]):
+        """Remember in which module types are found, and the function that makes one."""
         self.module, self.make = module, make
         self.known: dict[str, type] = {}
 

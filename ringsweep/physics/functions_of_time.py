@@ -91,6 +91,7 @@ class _Reader(Reader):
     """Makes expressions of the time."""
 
     def _call(self, tree: ast.Call, name: str, within: tuple[tuple[int, bool], ...]) -> Node:
+        """Expression of a call; of the functions only some are allowed, as for friction."""
         if name in self.language.functions and name != "abs" and len(tree.args) == 1:
             inner = self.visit(tree.args[0], within)
             if name == "tan":
@@ -99,6 +100,7 @@ class _Reader(Reader):
         return super()._call(tree, name, within)
 
     def _first_where_negative(self, difference: Node, a: Node, b: Node, within: tuple[tuple[int, bool], ...]) -> Node:
+        """Expression `a` where a straight line in t is negative, else `b`: the line changes its sign once."""
         if derivative(difference).varies:
             raise FormulaError(
                 "min, max and abs find the time of their switch only where two expressions differ by a straight line "

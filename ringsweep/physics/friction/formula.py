@@ -92,6 +92,7 @@ class FormulaError(ValueError):
     """
 
     def __init__(self, problem: str, key: str = "mu"):
+        """`problem` is the message; `key` is the key of the configuration that is wrong."""
         self.key = key
         super().__init__(problem)
 
@@ -217,6 +218,7 @@ class Reader:
     """Makes expressions from the syntax tree of a formula."""
 
     def __init__(self, language: Language = FRICTION) -> None:
+        """Read formulas of a language; no threshold is known yet."""
         self.language = language
         self.thresholds: list[Threshold] = []
 
@@ -381,6 +383,7 @@ class Units:
     """Infers the units of parameters: sums need equal units, functions take plain numbers, or angles."""
 
     def __init__(self, language: Language = FRICTION) -> None:
+        """Infer units in formulas of a language; no unit is known yet."""
         self.language = language
         self.names: dict[str, None] = {}
         # Units of parameters as far as they are known: none contains another of these parameters.

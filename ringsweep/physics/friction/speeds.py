@@ -172,6 +172,7 @@ class _Finder:
     """
 
     def __init__(self, expression: Expression, columns: _Columns, surfaces: list[_Surface]) -> None:
+        """Repeat the parameters for each surface: row ``surface * cells + cell``."""
         self.expression, self.surfaces = expression, len(surfaces)
         self.values = {name: np.tile(column, len(surfaces)) for name, column in columns.items()}
         self.values["mu_s"], self.values["mu_k"] = (np.concatenate(column) for column in zip(*surfaces, strict=True))
