@@ -23,7 +23,7 @@ from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import StepControl, implicit_step, start_at, start_control
-from ringsweep.solvers.steps import Step, either, lent, scratch_for
+from ringsweep.solvers.steps import Step, either, scratch_for, without_counts
 from ringsweep.solvers.taylor import series_step
 from ringsweep.solvers.variation import at_event
 
@@ -177,7 +177,7 @@ def _step_of_simpler_scene(kind, scene, run, h_max, tolerances, scratch):
     """Implement :func:`_step_in`: the simpler scene takes the step in its modes."""
     if not simpler.is_simpler(scene, run.mode):
         return _step_of_family(family(scene.law), scene, run, h_max, tolerances, scratch)
-    part, record, y = simpler.part(scene, run.record, run.mode, run.y)
+    part, record, y = simpler.simplify(scene, run.record, run.mode, run.y)
     run_of_part = Run(record, run.mode, run.now, y, run.control, run.local, run.has_switched)
     is_implicit, guard, s, y, record, control, local = _step_of_family(
         family(scene.law), part, run_of_part, h_max, tolerances, scratch
@@ -343,7 +343,7 @@ def integrate(batch, tolerances, max_steps, results, history):
 @kernel
 def _integrate(batch, tolerances, max_steps, results, history, scratch):
     """Run every cell; see :func:`integrate`."""
-    scratch = lent(scratch)
+    scratch = without_counts(scratch)
     c = scratch.c
     rows, steps, audits = borrowed(results.rows), borrowed(results.steps), borrowed(results.audits)
     history = History(history.spacing, borrowed(history.times), borrowed(history.table))

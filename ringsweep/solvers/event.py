@@ -1,4 +1,8 @@
-"""Methods that locate every event: `event` for set-valued laws, `implicit` for smooth and dynamic laws."""
+"""Methods that locate every event: `event` for set-valued laws, `implicit` for smooth and dynamic laws.
+
+Nothing here runs in kernels: :mod:`automaton` does. A batch is run at two tolerances, and :mod:`certificate` compares
+the runs.
+"""
 
 from __future__ import annotations
 

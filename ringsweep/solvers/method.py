@@ -1,4 +1,7 @@
-"""Base class of all methods, and the results that they return to a sweep."""
+"""Base class of all methods, and the results that they return to a sweep.
+
+``ringsweep/runs`` calls a method for each batch of cells; `structure` is a :class:`ringsweep.models.scene.Structure`.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,9 @@
 Each stage solves one linear system, without iteration; this suits a stiff system of a few equations. The order does not
 drop on the slow manifold along which a stuck contact creeps. Coefficients: G. Steinebach, BIT Numerical Mathematics 63,
 27 (2023).
+
+Only ``creep.py`` calls it. `x` is the state of an implicit step, `bends` an array of three rows for the dense output,
+`fraction` a place within the step, from 0 to 1.
 """
 
 from __future__ import annotations

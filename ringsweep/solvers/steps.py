@@ -89,8 +89,8 @@ class Step(NamedTuple):
 
 
 @inlined
-def lent(scratch):
-    """Scratch whose arrays are not counted; see :func:`ringsweep.compile.borrowed`."""
+def without_counts(scratch):
+    """Scratch whose arrays have no reference counts, see :func:`ringsweep.compile.borrowed`."""
     c, work, course, bends, first_guard = scratch
     return Scratch(borrowed(c), borrowed(work), borrowed(course), borrowed(bends), first_guard)
 

@@ -31,7 +31,7 @@ def enter_implicit(asked, scene, record, start):
 
 @feature("record")
 def along_series(asked, scene, record, run, ends, scratch):
-    """Record after an interval of a step of series, which begins with `run`; `ends` are those of the interval, s."""
+    """Record after an interval of a step of series from `run`; `ends` are times since the step began, s."""
     c, work, (low, high) = scratch.c, scratch.work[1:], ends
     width = high - low
     while low < high:
@@ -50,7 +50,7 @@ def along_series(asked, scene, record, run, ends, scratch):
 
 @feature("record")
 def along_implicit(asked, scene, record, start, taken, ends, scratch):
-    """Record after an interval of an implicit step, `taken`; `ends` are those of the interval, as fractions."""
+    """Record after an interval of the implicit step `taken`; `ends` are its first and last fraction."""
     (low, high), work = ends, scratch.work[1:]
     if not high > low:
         return record

@@ -1,4 +1,8 @@
-"""Whether a run obeys its friction law, checked with formulas that the solver did not use."""
+"""Whether a run obeys its friction law, checked with formulas that the solver did not use.
+
+Who calls: ``ringsweep/solvers/audit.py`` calls ``violation`` and ``energy`` in kernels, after steps; ``event.py`` and
+``certificate.py`` call the others in Python, after all runs of a batch.
+"""
 
 from __future__ import annotations
 

@@ -12,6 +12,9 @@ A step advances several runs side by side: it gets vector lanes in place of floa
 (``rates``, ``inspect``, ``inspect_next``, ``holds``, ``eigenvalue``, ``margin``, ``arc_share``, ``seen``, ``sticks``
 and the recorder's ``observe``) are written without ``if``, see :mod:`ringsweep.numerics.functions`, and all numbers of
 an inspection and of a record are floats. A step in which a run ends is repeated for this run with floats.
+
+Only ``ringsweep/solvers/rk4.py`` calls these functions: ``initial_state`` once, ``row`` for a history, the others in
+each step.
 """
 
 from __future__ import annotations

@@ -6,6 +6,9 @@ place, the sliding velocity in m/s, and the deflection (m) of each bundle of bri
 
 A *forcing* is what the equations need to know of a time: angle (rad) or displacement (m) of the drive, and its first
 two time derivatives. A *view* is what a solver needs to know of a state: the guards and the motion.
+
+Who calls: ``ringsweep/solvers/creep.py``, once or several times in each step; ``rates`` and ``linearise`` by the
+method in ``rosenbrock.py``. Nothing may be remembered between calls, since steps are rejected and repeated.
 """
 
 from __future__ import annotations

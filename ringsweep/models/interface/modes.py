@@ -8,6 +8,9 @@ A mode lasts while its guards, which are functions of the state, are positive.
 The state holds the place, the sliding velocity in m/s, and the deflection (m) of each bundle of bristles if there are
 any. The place is an angle (rad) or a displacement (m). The state holds the sliding velocity, not the velocity in space,
 because the difference of two large velocities would lose all its digits.
+
+Who calls: ``ringsweep/solvers/automaton.py``. ``begin`` once at launch, ``switch`` at each event, ``in_space`` and
+``limit_of_jam`` at the end, ``row`` for a history only.
 """
 
 from __future__ import annotations

@@ -3,6 +3,10 @@
 A solver passes each state to the recorder as a tuple, ``seen``. The model chooses what the tuple holds. For the ring
 these are angle, angular velocity and both normal reactions; for the belt displacement, velocity and friction force. The
 functions ``constant_step.seen``, ``series.seen_at`` and ``implicit.seen`` make the tuples.
+
+Who calls: ``automaton.py``, ``taylor.py``, ``creep.py`` and ``rk4.py`` of the solvers. ``begin`` once at launch,
+``observe`` after each interval, ``conclude`` once at the end; solvers that locate events call ``enter`` at the
+beginning of each step, and ``after_event`` after each event.
 """
 
 from __future__ import annotations

@@ -3,6 +3,9 @@
 A step fills a table of shape ``(rows, columns)``. Each row is a power series in the time since the beginning of the
 step: coefficient k is in column k, for k up to :data:`ringsweep.numerics.series.ORDER`. The model chooses the rows; the
 last ones are the guards of the mode. States are those of :mod:`modes`.
+
+Who calls: ``ringsweep/solvers/taylor.py`` in each step: first ``expand``, then the others, which read the table. The
+audit and the history of a run read it too, after the step.
 """
 
 from __future__ import annotations

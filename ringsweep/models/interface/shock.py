@@ -2,6 +2,9 @@
 
 The acceleration jumps at the edge of a zone, at breakaway, at a stop and at a reversal. A method that locates these
 events shows the recorder the acceleration on both sides. A method of constant step does not: its runs have no shocks.
+
+The records of the models call these functions. `shocks` is a :class:`Shocks`, `seen` a :class:`Located`; each is an
+empty tuple for a method that does not locate events.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Scenes some of whose modes are those of a simpler scene, with fewer components of the state and fewer series."""
+"""Scenes some of whose modes are those of a simpler scene, with fewer components of the state and fewer series.
+
+Only the body with impact in the ring uses it, and only ``ringsweep/solvers/automaton.py`` calls it, in each step.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,8 @@ def is_simpler(scene, mode):
 
 
 @hook
-def part(scene, record, mode, y):
-    """The simpler scene, its record, and its state."""
+def simplify(scene, record, mode, y):
+    """``(scene, record, y)`` of the simpler scene, before a step of it."""
 
 
 @hook

@@ -7,6 +7,8 @@ matrix (Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical 
 .. math:: S = I + \\frac{(f^+ - f^-)\\, n^T}{n^T f^- + \\partial_t h},
 
 where n is the gradient of the guard h. In stick w keeps no component along the sliding velocity.
+
+Only ``ringsweep/solvers/variation.py`` calls these functions, and only if the scene asks for an exponent.
 """
 
 from __future__ import annotations
@@ -96,4 +98,17 @@ def propagate(scene, record, h, rates, weights, work):
 
 @hook
 def apply_saltation(scene, record, mode, guard, t, y):
-    """Record after a guard of a mode has vanished; the arguments are those of :func:`modes.switch`."""
+    """Record after a guard of a mode has vanished.
+
+    Parameters
+    ----------
+    scene, record : NamedTuple
+    mode : NamedTuple
+        Mode that ends.
+    guard : int
+        Index of the guard, as for :func:`ringsweep.models.interface.modes.switch`.
+    t : Instant
+        Time of the event, s.
+    y : tuple of float
+        State before the event.
+    """

@@ -121,9 +121,9 @@ def _is_closed(scene, mode):
     return mode.contacts.open == NONE
 
 
-@simpler.part.implements(ImpactRing)
-def _part_of_closed(scene, record, mode, y):
-    """Implement :func:`simpler.part`: the closed ring, its record, and ``(phi, v)``."""
+@simpler.simplify.implements(ImpactRing)
+def _simplify_closed(scene, record, mode, y):
+    """Implement :func:`simpler.simplify`: the closed ring, its record, and ``(phi, v)``."""
     return ring_of(scene, mode.contacts.turned), record.base, (y[0], y[1])
 
 
