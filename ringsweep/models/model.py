@@ -1,4 +1,8 @@
-"""Base class of all models: parameters, outcomes, and types of scenes."""
+"""Base class of all models: parameters, outcomes, and types of scenes.
+
+Nothing here runs in kernels. `structure` says which parts a scene has, `values` are its numbers in SI units by path,
+of shape ``(cells,)``. ``ringsweep/config`` reads parameters and checks; ``ringsweep/runs`` builds cells.
+"""
 
 from __future__ import annotations
 

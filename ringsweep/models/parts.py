@@ -1,4 +1,8 @@
-"""Parts that models share: parameters, friction coefficients, friction laws and drives."""
+"""Parts that models share: parameters, friction coefficients, friction laws and drives.
+
+Nothing here runs in kernels, but for the eigenvalues, which ``rk4`` takes. The others are called as a model builds
+its cells; `values` are numbers in SI units by path, of shape ``(cells,)``.
+"""
 
 from __future__ import annotations
 

@@ -131,8 +131,8 @@ def larger(a, b):
 
 
 @inlined
-def of_balances(scene, friction, normals, motion, forcing, rate, scales):
-    """Violation of the balances and of the signs of the reactions by a state in slip or stick, and power, W.
+def imbalances(scene, friction, normals, motion, forcing, rate, scales):
+    """``(violation, power)`` of a state: largest violation of balances and signs of reactions, 1; power, W.
 
     Parameters
     ----------
@@ -187,5 +187,5 @@ def _violation_on_bristles(scene, mode, forcing, y, rates, s, tolerance):
         scale = (1.0 / s + abs(bundle.rate_z)) * deflection + abs(bundle.rate_v) * speed + _ROUNDING * abs(v)
         largest = larger(largest, abs(bundle.rate - rates[2 + i]) / scale)
     normals = ring.reactions(body, *now.K, now.motion)
-    violation, power = of_balances(scene, now.K, normals, now.motion, forcing, rates[1], (allowed, terms, tolerance))
+    violation, power = imbalances(scene, now.K, normals, now.motion, forcing, rates[1], (allowed, terms, tolerance))
     return larger(larger(largest, -mode.sign * v / speed), violation), power

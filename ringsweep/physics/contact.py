@@ -213,7 +213,7 @@ def opening(body, friction, static, slides, motion, epsilon):
     if slides != 0:
         _, determinant = ring.acceleration(body, *friction, motion)
         load = 0.0 if determinant > 0.0 else load
-    return IMPOSSIBLE if load > _ROUNDING * body.mass * _scale(body, motion[2], epsilon) else OPEN_1
+    return IMPOSSIBLE if load > _ROUNDING * body.mass * _size_per_mass(body, motion[2], epsilon) else OPEN_1
 
 
 @inlined
@@ -294,7 +294,7 @@ def lost(body, first, second):
 
 
 @inlined
-def _scale(body, omega, epsilon):
+def _size_per_mass(body, omega, epsilon):
     """Size of the terms in the balances of momentum, per unit of mass, m/s^2; greater than zero even without a load."""
     return body.gravity + body.radius * (omega * omega + abs(epsilon)) + 1e-300
 
@@ -319,7 +319,7 @@ def _slip_margin(body, sign, friction, tangential, motion, epsilon):
     K1, K2 = -sign * friction[0], -sign * friction[1]
     phi_dd, determinant = ring.acceleration(body, K1, K2, motion)
     n1, n2 = ring.reactions(body, K1, K2, motion)
-    terms = _scale(body, motion[2], epsilon)
+    terms = _size_per_mass(body, motion[2], epsilon)
     push = sign * body.radius * (phi_dd - epsilon) / terms
     if tangential:
         # The body starts to slide if even more friction than the limit would be needed to hold it.
@@ -356,7 +356,7 @@ def at_rest(body, static, forward, backward, motion, epsilon, released):
     held = -1.0
     if released == 0:
         _, reserve, n1, n2 = stick(body, m1, m2, motion, epsilon)
-        load = body.mass * _scale(body, motion[2], epsilon)
+        load = body.mass * _size_per_mass(body, motion[2], epsilon)
         # Without friction or without a load the body cannot stick.
         if m1 + m2 > 0.0 and min(n1, n2) > _ROUNDING * load:
             held = min(reserve, min(n1, n2)) / load
@@ -395,6 +395,6 @@ def sliding(body, K1, K2, motion):
     """
     _, determinant = ring.acceleration(body, K1, K2, motion)
     n1, n2 = ring.reactions(body, K1, K2, motion)
-    if min(n1, n2) > _ROUNDING * body.mass * _scale(body, motion[2], 0.0):
+    if min(n1, n2) > _ROUNDING * body.mass * _size_per_mass(body, motion[2], 0.0):
         return CLOSED if determinant > 0.0 else IMPOSSIBLE
     return opening(body, (K1, K2), (0.0, 0.0), 1, motion, 0.0)

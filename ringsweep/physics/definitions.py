@@ -1,4 +1,7 @@
-"""Types that formulas define: of friction laws, of drives and of forces."""
+"""Types that formulas define: of friction laws, of drives and of forces.
+
+Such a type has the name of a module and a qualified name, by which a compiled kernel in the cache finds it again.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,9 @@
 
 The force has the laws of the drives: :math:`P(t) = P_0 + A\\, s(t)`, with a shape s of :mod:`ringsweep.physics.drives`
 and an amplitude A in N.
+
+A :class:`Forced` drive is a drive too: it takes each question about the motion to the drive that it holds. Only the
+belt has one.
 """
 
 from __future__ import annotations

@@ -2,6 +2,10 @@
 
 A surface is either uniform, or divided into segments by the edges of its zones. Angles are in the frame of the
 ring, in which the zones are fixed.
+
+`edges` are ascending angles, rad. A *place* is a segment and the number of whole turns to its lower edge, so that a
+contact on an edge is on one side of it, and rounding does not take it across. Models call these functions at events;
+``rk4`` calls :func:`roughness` in each stage.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import numpy as np
 from ringsweep.compile import inlined
 from ringsweep.models.belt.force import breakaway_force, length_scale, moving, slip_from, speed_scale
 from ringsweep.models.interface import audit, implicit
-from ringsweep.models.sliding import audited, larger, of_balances, speed_in
+from ringsweep.models.sliding import audited, imbalances, larger, speed_in
 from ringsweep.models.slip import acceleration_slopes, slip
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
@@ -44,7 +44,7 @@ def _least_scales_on_belt(batch):
 
 @audit.violation.implements(Belt)
 def _violation_on_belt(scene, mode, forcing, y, rates, s, tolerance):
-    """Implement :func:`audit.violation` for laws of the velocity."""
+    """Implement :func:`audit.violation` for laws of the velocity: law, balance, and sign of the reaction."""
     x, v = y
     body, push = scene.body, force_in(scene.drive, forcing)
     velocity = forcing[1] if mode.sign == 0 else moving(scene, v + forcing[1], v, forcing[1])
@@ -66,7 +66,7 @@ def _violation_on_belt(scene, mode, forcing, y, rates, s, tolerance):
             speed = speed_in(scene, mode, speed)
             largest = -mode.sign * v / (tolerance * speed)
     scales = (1.0 / s + relaxation) * tolerance * speed, _terms(body, motion, forcing), tolerance
-    violation, power = of_balances(scene, (K, K), ring.reactions(body, K, K, motion), motion, forcing, rates[1], scales)
+    violation, power = imbalances(scene, (K, K), ring.reactions(body, K, K, motion), motion, forcing, rates[1], scales)
     return larger(largest, violation), power
 
 

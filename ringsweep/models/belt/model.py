@@ -1,4 +1,8 @@
-"""The belt as a model: its parameters and its cells."""
+"""The belt as a model: its parameters and its cells.
+
+Nothing here runs in kernels. `structure` says which parts a scene has, `values` are its numbers in SI units by path,
+of shape ``(cells,)``; see :mod:`ringsweep.models.scene`.
+"""
 
 from __future__ import annotations
 

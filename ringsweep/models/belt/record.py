@@ -256,13 +256,13 @@ def _observe_on_belt(scene, record, t, duration, stuck, seen):
         r.band,
         r.play,
         Last(
-            _located(r.last.t, t),
+            _if_located(r.last.t, t),
             x,
             velocity,
             place,
             v,
-            _located(r.last.v_rate, v_rate),
-            _located(r.last.pull, scene.body.mass * v_rate + force),
+            _if_located(r.last.v_rate, v_rate),
+            _if_located(r.last.pull, scene.body.mass * v_rate + force),
         ),
         x_min,
         x_max,
@@ -300,14 +300,14 @@ def _least_turn(r, span):
     return max(r.play, _ROUNDING * span)
 
 
-def _located(before, now):
-    """`now`, the form for floats: methods that locate events know the last time and rate exactly."""
+def _if_located(before, now):
+    """`now`, the form for floats: methods that locate events know the present value exactly."""
     return now
 
 
-@lanes_body(_located)
-def _located_in_lanes(before, now):
-    """`before`, the form for vector lanes: methods of constant step do not need the value."""
+@lanes_body(_if_located)
+def _if_located_in_lanes(before, now):
+    """`before`, the form for vector lanes: methods of constant step need no time or pull, and keep the old one."""
     return before
 
 
@@ -342,7 +342,7 @@ def _stops(scene, r, now, stuck, place, sliding, force):
     slowing = max(abs(r.last.v_rate), abs(_rate(rate, v_rate)))
     passage = _PASSAGE * max(max(r.band, scale), abs(r.last.v)) / slowing
     # Under a greater pull than that of breakaway a set-valued law would let the body pass, maybe slowly.
-    pull = _located(scene.body.mass * rate + force, r.last.pull)
+    pull = _if_located(scene.body.mass * rate + force, r.last.pull)
     passes = abs(pull) > (1.0 + 1e-9) * breakaway_force(scene, r.last.x)
     passage = max(passage, select(passes, square_root(r.band * _pace(scene) / slowing), 0.0))
     start = select(anew, before, s.start)

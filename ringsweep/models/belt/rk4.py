@@ -1,4 +1,8 @@
-"""The belt for steps of constant length. The state is ``(x, velocity)``, in space, and the deflection of bristles."""
+"""The belt for steps of constant length. The state is ``(x, velocity)``, in space, and the deflection of bristles.
+
+Solver ``rk4`` calls what this file implements, through :mod:`ringsweep.models.interface.constant_step`. All numbers
+may be vector lanes. :mod:`ringsweep.models.inspection` makes the inspections, for the ring too.
+"""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from ringsweep.models.interface import audit
 from ringsweep.models.ring.bristles import slip_of
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.series import NORMAL_1, NORMAL_2
-from ringsweep.models.sliding import REACTION_TOLERANCE, audited, larger, of_balances, rate_at_rest, speed_in
+from ringsweep.models.sliding import REACTION_TOLERANCE, audited, imbalances, larger, rate_at_rest, speed_in
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.velocity import friction_at
@@ -55,7 +55,7 @@ def _names_wrong_segment(scene, mode, rho, under):
 
 @audit.violation.implements(ring.Ring)
 def _violation_on_ring(scene, mode, forcing, y, rates, s, tolerance):
-    """Implement :func:`audit.violation` for laws of the velocity."""
+    """Implement :func:`audit.violation` for laws of the velocity: law, balances, and signs of the reactions."""
     body = scene.body
     phi, v = y
     theta, ring_omega, ring_epsilon = forcing
@@ -83,7 +83,7 @@ def _violation_on_ring(scene, mode, forcing, y, rates, s, tolerance):
             largest = inf
     # An error of the velocity changes the acceleration through the slope of friction, and the mean rate over the step.
     scales = (1.0 / s + relaxation) * tolerance * speed, terms, tolerance
-    violation, power = of_balances(scene, (K1, K2), (normal_1, normal_2), motion, forcing, rates[1], scales)
+    violation, power = imbalances(scene, (K1, K2), (normal_1, normal_2), motion, forcing, rates[1], scales)
     return larger(largest, violation), power
 
 

@@ -1,6 +1,9 @@
 """What a motion on a ring with a periodic drive settles to: its cycles, its section, and its small disturbances.
 
 A *cycle* is a period of the drive. States that differ by full turns of the body are the same.
+
+Only the record of the ring calls it. `long_run` is a :class:`LongRun`, an empty tuple if the scene does not ask for
+it; then nothing of this file is compiled.
 """
 
 from __future__ import annotations
@@ -36,7 +39,7 @@ class Asked(NamedTuple):
 
 
 class LongRun(NamedTuple):
-    """Cycles up to now, and what is asked for beside them.
+    """Record of a long run: cycles up to now, growth of disturbances, and points of the section.
 
     Attributes
     ----------

@@ -1,4 +1,9 @@
-"""Record and outcome of runs on the ring: reversals, turns, extremes, motion, regime."""
+"""Record and outcome of runs on the ring: reversals, turns, extremes, motion, regime.
+
+Solvers call what this file implements through :mod:`ringsweep.models.interface.recorder`. Numbers may be vector
+lanes, so conditions are written with `select`. `epsilon_omega` is the angular velocity that a reversal must pass,
+rad/s.
+"""
 
 from __future__ import annotations
 

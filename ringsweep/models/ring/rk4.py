@@ -1,4 +1,8 @@
-"""The ring for steps of constant length. The state is ``(phi, omega)``, and the deflections of bristles."""
+"""The ring for steps of constant length. The state is ``(phi, omega)``, and the deflections of bristles.
+
+Solver ``rk4`` calls what this file implements, through :mod:`ringsweep.models.interface.constant_step`. All numbers
+may be vector lanes. :mod:`ringsweep.models.inspection` makes the inspections, for the belt too.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +38,7 @@ def _rates_in_constant_step_on_ring(scene, now, y, forcing):
 
 @constant_step.inspect.implements(Ring, BristleRing)
 def _inspect_on_ring(scene, y, forcing):
-    """Implement :func:`constant_step.inspect`."""
+    """Implement :func:`constant_step.inspect`; sine and cosine of phi are computed anew."""
     return inspection(scene, y, y[0], forcing, sine_cosine(y[0]))
 
 

@@ -217,7 +217,7 @@ def _reset_integrator_bristle(law, mu_s, mu_k, v, z, sign, region):
 
 @region_guard.implements(ResetIntegrator)
 def _reset_integrator_region_guard(law, mu_s, mu_k, v, z, sign, region):
-    """Implement :func:`region_guard`: friction reaches mu_s; slip ends by the guard of the speed alone."""
+    """Implement :func:`region_guard`: in BAND what friction lacks to mu_s; constant in KINETIC, which a rest ends."""
     sticks = 1.0 if region == BAND else 0.0
     return sticks * (mu_s - law.sigma0 * sign * z) + (1.0 - sticks)
 

@@ -2,6 +2,9 @@
 
 The text is read with Python's grammar, but it is never run. Names are the sliding speed ``v``, the coefficients
 ``mu_s`` and ``mu_k`` of the surface, ``pi``, and parameters of the law.
+
+`within` lists the switches within which a part of the formula stands: pairs of an index of a threshold, and whether
+the part holds below it. Nothing here runs in kernels.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Friction laws of the sliding velocity, each written as one formula.
 
 Set-valued laws hold a contact at rest with any force up to ``mu_s``; smooth laws vanish at v = 0.
+
+Nothing here runs in kernels: :mod:`velocity` writes the code from the
+:class:`ringsweep.physics.friction.velocity.Expression` of a law.
 """
 
 from __future__ import annotations

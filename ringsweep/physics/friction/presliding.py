@@ -2,6 +2,9 @@
 
 Stiffness and damping are per unit of the normal load: 1/m and s/m. The traction is the force per unit of the load,
 :math:`\\mu = \\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v`, where z is the mean deflection of the bristles.
+
+Models call :func:`bristle` in each stage of a step, :func:`region_guard` in each step, and the others at events or at
+launch.
 """
 
 from __future__ import annotations

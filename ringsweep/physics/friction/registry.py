@@ -1,4 +1,8 @@
-"""Registry of the friction laws: names, families and traits."""
+"""Registry of the friction laws: names, families and traits.
+
+A *family* decides which solver and which code a law takes; *traits* are facts about one law. Configuration, models
+and solvers read them.
+"""
 
 from __future__ import annotations
 

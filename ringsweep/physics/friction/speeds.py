@@ -182,7 +182,7 @@ class _Finder:
         self.found: dict[Any, Any] = {}
 
     def fields(self) -> dict[str, NDArray[Any]]:
-        """Fields of the law that are found once for each cell, see :func:`hidden_fields`."""
+        """Fields of the law for each cell: band, edges, thresholds, and steepest slopes; see :func:`hidden_fields`."""
         for threshold in self.expression.thresholds:
             speed = self._speed_of(threshold)
             for index, lower in threshold.within:

@@ -131,7 +131,7 @@ def _row_at(pieces, speed):
 
 
 def _piece_at(pieces, speed):
-    """Cubic of a table at a speed, for floats and Lanes."""
+    """Row of the table of cubics at a speed, m/s: the knot at which the piece begins, and four coefficients."""
     i = _row_at(pieces, speed)
     return pieces[i, 0], pieces[i, 1], pieces[i, 2], pieces[i, 3], pieces[i, 4]
 

@@ -65,7 +65,7 @@ def _is_stiff_with_impact(scene, mode, y, linear):
 
 @implicit.error_scales.implements(ImpactRing)
 def _error_scales_with_impact(scene, tolerance, x):
-    """Implement :func:`implicit.error_scales`; the code of the contacts has no error."""
+    """Implement :func:`implicit.error_scales` for psi - theta, v, eta, its rate, and the code, which has no error."""
     place, speed, _ = implicit.error_scales(scene.closed, tolerance, (x[0], x[1]))
     gap = tolerance * _GAP_TOLERANCE
     return (

@@ -1,4 +1,7 @@
-"""The limit of a jam of a body that may leave the race, see :mod:`ringsweep.models.ring.jam`."""
+"""The limit of a jam of a body that may leave the race, see :mod:`ringsweep.models.ring.jam`.
+
+Called once, after a run has ended with JAM.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The models of a body in the ring that goes on after a contact is lost."""
+"""The models of a body in the ring that goes on after a contact is lost.
+
+Nothing here runs in kernels. A scene with the section ``impact`` takes these models in place of those of the ring.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Rows of the history of a run that goes on after a contact is lost."""
+"""Rows of the history of a run that goes on after a contact is lost.
+
+Called for histories only, once for each row.
+"""
 
 from __future__ import annotations
 
