@@ -1,4 +1,8 @@
-"""Kernels, and the key of their machine code in the cache on disk."""
+"""Kernels, and the key of their machine code in the cache on disk.
+
+The key covers the text of all sources that kernels are made of: an edit of one of them compiles all kernels anew, so
+a wrong result never comes from old code.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Hooks: functions with one body for each type of their first argument."""
+"""Hooks: functions with one body for each type of their first argument.
+
+The *body* of a hook for a type is what ``@hook.implements(Type)`` decorates. Its arguments have the names of the
+hook's arguments, and the hook's docstring says what they are.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,9 @@
 """Everything that this package uses of Numba's private interfaces: with them kernels compile in a third of the time.
 
 A release of Numba may change what lies behind the names: `pyproject.toml` has an upper bound.
+
+Methods of classes that derive from a class of Numba are called by Numba, and replace its own method of that name.
+What follows after an upgrade of Numba: run all tests; if a name is gone, look at Numba's own method.
 """
 
 from __future__ import annotations
@@ -158,7 +161,7 @@ class _CalleeLowering(NativeLowering):
 
 
 class _ReferenceCounts(NRTContext):
-    """Reference counts without the code that takes apart tuples of numbers in search of arrays."""
+    """Numba's reference counts, without code that takes apart tuples of numbers in search of arrays."""
 
     def get_meminfos(self, builder: Any, ty: Any, val: Any) -> Any:
         """Reference counts in a value; none are looked for in a tuple of numbers."""
@@ -297,7 +300,7 @@ class _Passes(PassManager):
     """Passes without a record of each of them: it prints the types of all arguments."""
 
     def _runPass(self, index: int, one: Any, state: Any) -> None:
-        """Run a pass."""
+        """Run one pass, and record nothing."""
         one.analysis = self._analysis
         one.run_initialization(state)
         one.run_pass(state)
@@ -324,7 +327,7 @@ class _KernelCompiler(CompilerBase):
         self.state.targetctx.typing_context = self.state.typingctx
 
     def define_pipelines(self) -> list[Any]:
-        """Passes for a function, by whether Numba must inline something in it."""
+        """Passes for a function: fewer if it calls nothing that Numba must inline."""
         code = self.state.func_id.func.__code__
         closures = any(isinstance(constant, CodeType) for constant in code.co_consts)
         return [self._passes(not closures and _INLINED_BY_NUMBA.isdisjoint(code.co_names))]

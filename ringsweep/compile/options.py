@@ -1,4 +1,8 @@
-"""Numba's options for all compiled code, and the decorators of formulas."""
+"""Numba's options for all compiled code, and the decorators of formulas.
+
+A function with ``@inlined`` or ``@absorbed`` is compiled only as a part of a kernel. It may take and return floats,
+nested tuples, and arrays.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 A number near 1e6 resolves 1e-10. A clock that is rounded so at each event would misplace the events of a late period,
 and a force would not have the value at which its event was located.
+
+Solvers pass an :class:`Instant` as time; `now` and `t` with `rest` are its parts.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 An expression is a graph in which equal parts are one node. So common parts are computed once, in whatever language the
 expression is written out later.
+
+Laws and drives are made of the functions here when they are defined; nothing here runs in kernels.
 """
 
 from __future__ import annotations

@@ -10,6 +10,9 @@ side (``Lanes``, polynomials below). The polynomials need arguments close to zer
 
 with :math:`n` the nearest integer. The results differ from the C library by at most 6e-16; sine and cosine up to
 arguments of 1e6. The numbers of a run do not depend on the runs in the other lanes.
+
+The form of a function for vector lanes stands behind it, with the name ``..._in_lanes``. An edit of one needs the
+same edit of the other.
 """
 
 from __future__ import annotations

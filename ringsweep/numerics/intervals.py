@@ -372,7 +372,7 @@ class Enclosure:
         values: Mapping[str, NDArray[np.float64]],
         thresholds: Sequence[NDArray[np.float64]] = (),
     ) -> None:
-        """Sort the nodes, and find those that do not depend on the speed, once."""
+        """Find the constant nodes once, and the quotients of polynomials: their slopes have bounds of their own."""
         self.output, self.thresholds = output, thresholds
         self.rows = len(next(iter(values.values()))) if values else 1
         found: dict[Node, Interval] = {}

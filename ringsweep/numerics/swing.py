@@ -3,6 +3,8 @@
 Such is the motion of a body that slides under constant friction. Two products of series follow from the rotation of
 sine and cosine, and one is the square. All coefficients stay in registers, and the newest enter a sum last, so that the
 next coefficient waits for few instructions.
+
+Only slip on a ring under friction that does not depend on the speed takes it, once in each step.
 """
 
 from __future__ import annotations

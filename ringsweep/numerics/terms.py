@@ -362,7 +362,7 @@ specialise(joined, _joined_in_kernel, absorb=True)
 
 
 def part_from(values, like, after):
-    """As many numbers of a tuple as the tuple `like` is long, behind as many as the tuple `after` is long."""
+    """``values[len(after):len(after) + len(like)]``, in kernels."""
     return values[len(after) : len(after) + len(like)]
 
 
