@@ -251,7 +251,7 @@ def _shifted(builder: Any, pointer: Any, offset: int) -> Any:
 
 
 def _load_word(builder: Any, kind: Any, pointer: Any, offset: int) -> Any:
-    """Number or address in the block."""
+    """Number or address that is `offset` bytes behind `pointer`, of the LLVM type `kind`."""
     value = builder.load(builder.bitcast(_shifted(builder, pointer, offset), kind.as_pointer()), align=_WORD)
     # Nothing writes to the block while a kernel runs: a number that was loaded once need not be loaded again.
     value.set_metadata("invariant.load", builder.module.add_metadata([]))

@@ -54,7 +54,7 @@ def parameters(structure: Structure) -> dict[str, Parameter]:
 
 
 def batch(structure: Structure, values: Values) -> Any:
-    """Cells that kernels run over; see :meth:`Model.build`."""
+    """Cells that kernels run over, of shape ``(cells, ...)``; ``ringsweep/runs`` calls it. See :meth:`Model.build`."""
     # Products of values that a double can hold may overflow. Runs of such cells fail.
     with np.errstate(over="ignore", invalid="ignore"):
         return model_of(structure).build(structure, values)

@@ -28,7 +28,15 @@ from ringsweep.quantities.flags import CHAOTIC, QUASI_PERIODIC, TRANSIENT
 
 
 class Mark(NamedTuple):
-    """State at the end of a cycle: time, displacement, velocity, and `total` and `slips` of the stops until then."""
+    """State at the end of a cycle.
+
+    Attributes
+    ----------
+    t, x, velocity : float
+        Time, s; place, m or rad; its rate.
+    total, slips : float
+        Duration, s, and number of the stops until then.
+    """
 
     t: Any
     x: Any

@@ -257,7 +257,7 @@ def word_of_mode(scene, now):
 
 @word_of_mode.implements(Ring, Belt)
 def _word_of_mode_by_velocity(scene, now):
-    """Implement :func:`word_of_mode`: stick is the stiction band."""
+    """Implement :func:`word_of_mode`: stick within the stiction band, else the sign of the sliding velocity."""
     return 0.0 if abs(now.v) < stiction_band(scene.law) or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
 
 

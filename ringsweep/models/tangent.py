@@ -188,13 +188,13 @@ def log_size(x):
 
 @unrolled
 def _eigenvalues(length, vector, matrix, log_determinant):
-    """Magnitudes of the two largest eigenvalues, their logarithms, and their arguments."""
+    """``(first, second, log_1, log_2, angle_1, angle_2)`` of the two largest eigenvalues, by magnitude."""
     return [f"return {'_eigenvalues_of_two' if length == 2 else '_eigenvalues_of_three'}(matrix, log_determinant)"]
 
 
 @inlined
 def _eigenvalues_of_two(matrix, log_determinant):
-    """Eigenvalues of a 2 by 2 matrix, see :func:`eigenvalues`."""
+    """What :func:`_eigenvalues` returns, for a matrix of 2 rows."""
     # No mode of a motion turns the plane of its states over: real eigenvalues have one sign.
     a, b, c, d = matrix
     half, root = 0.5 * (a + d), 0.25 * (a - d) ** 2 + b * c
@@ -216,7 +216,7 @@ def _angle(x):
 
 @inlined
 def _eigenvalues_of_three(matrix, log_determinant):
-    """Eigenvalues of a 3 by 3 matrix: the two of largest magnitude, see :func:`eigenvalues`."""
+    """What :func:`_eigenvalues` returns, for a matrix of 3 rows, whose least eigenvalue is left out."""
     a, b, c, d, e, f, g, h, i = matrix
     minors = a * e - b * d + a * i - c * g + e * i - f * h
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
@@ -226,7 +226,7 @@ def _eigenvalues_of_three(matrix, log_determinant):
 
 @inlined
 def _of_cubic(trace, minors, determinant):
-    """The two largest roots of ``x^3 - trace x^2 + minors x - determinant``: their magnitudes and arguments."""
+    """``(first, second, angle_1, angle_2)`` of the largest roots of ``x^3 - trace x^2 + minors x - determinant``."""
     third = trace / 3.0
     p, q = minors - trace * third, (minors - 2.0 * third * third) * third - determinant
     discriminant = 0.25 * q * q + p * p * p / 27.0

@@ -464,7 +464,7 @@ SERIES_ROWS = 36
 
 @cache
 def _degree(node: Node) -> int | None:
-    """Degree of a polynomial, at most :data:`_MOST_DEGREE`; None for a higher one and for anything else."""
+    """Degree of a polynomial, at most 4; None for a higher one and for anything else."""
     if not node.varies:
         return 0
     if node.kind == "variable":
@@ -477,7 +477,7 @@ def _degree(node: Node) -> int | None:
 
 
 def is_polynomial(node: Node) -> bool:
-    """Whether a node is a polynomial of low degree between its switches."""
+    """Whether a node is a polynomial of degree 4 or less between its switches."""
     return _degree(node) is not None
 
 

@@ -133,7 +133,7 @@ def _piece(knots, t):
 
 @inlined
 def _cubic(drive, t):
-    """Taylor coefficients of the shape about time `t`, from the power 0 to 3."""
+    """Coefficients of the powers 0 to 3 of the shape about the time `t`, s: the cubic of the piece that holds it."""
     now, rest = clock.parts(t)
     j = _piece(drive.knots, now)
     x = (now - drive.knots[j]) + rest

@@ -262,7 +262,7 @@ def _product(m, x):
 
 @inlined
 def _solved(m, right):
-    """Whether three linear equations have a solution, and the solution.
+    """``(found, x, y, z)``: whether three linear equations have a solution, and the solution.
 
     The inverse is applied once more to what it leaves: of a body with little inertia it leaves more than rounding.
     """

@@ -70,7 +70,22 @@ def _after_creep(local, error):
 
 
 class Run(NamedTuple):
-    """A run between two steps; `has_switched` is whether its mode has just begun."""
+    """A run between two steps.
+
+    Attributes
+    ----------
+    record, mode : NamedTuple
+        As the model makes them.
+    now : Instant
+        Time, s.
+    y : tuple of float
+        State of the mode.
+    control : StepControl
+        Control of the next implicit step.
+    local : LocalErrors
+    has_switched : bool
+        Whether the mode has just begun.
+    """
 
     record: Any
     mode: Any
@@ -235,7 +250,7 @@ def _until(limit, now):
 
 @inlined
 def _after_step(scene, mode, guard, now, s, limit, y):
-    """Time, status, mode and state after a step of length `s`, at most up to `limit`, that `guard` ended (-1: none)."""
+    """``(now, status, mode, y)`` after a step of length `s`, at most up to `limit`, that `guard` ended (-1: none)."""
     # The sum of steps must not miss the end of the span, or a knot of the drive, by rounding.
     if s >= 0.0:
         now = later(now, s) if s < _until(limit, now) else Instant(limit, 0.0)

@@ -89,10 +89,7 @@ def _view_within(scene, start, scratch, taken, fraction):
 
 @inlined
 def _step_of_method(scene, start, course, h, end, bends):
-    """State after a step of the method, and the estimate of its error; see :func:`rosenbrock.step`.
-
-    `end` is the forcing at the end.
-    """
+    """``(x, error)`` after a step of :func:`rosenbrock.step` of length `h`, s; `end` is the forcing at its end."""
     now = start.now
     first, second, third, fourth, _ = rosenbrock.STAGE_TIMES
     forcings = (

@@ -313,7 +313,7 @@ def _hermite(y, rate, y_next, rate_next, h, x):
 
 @inlined
 def _step_to_end(scene, y, now, table, k, h):
-    """Status after a step, or after the fraction of it in which the run ends; this fraction; state and inspection.
+    """``(status, fraction, y, inspection)`` after a step, or after the fraction of it in which the run ends.
 
     The inspection is that at the end of the whole step.
     """

@@ -468,7 +468,10 @@ def _settles_to(scene, r, t):
 
 @feature("means")
 def _of_last_cycles(parts, c, repeats, means):
-    """Share of stick, stops in a cycle, swing (m), mean velocity (m/s) of the last half; `means` without halves."""
+    """``(share, stops, swing, drift)`` of the last half of the cycles: share of stick; stops in a cycle; m; m/s.
+
+    `means` are the same of all cycles, which are returned if there are no halves.
+    """
     before = parts.before
     if c.count <= before.count:
         return means
@@ -481,7 +484,7 @@ def _of_last_cycles(parts, c, repeats, means):
 
 @inlined
 def _words(scene, r, t, of):
-    """Words for the motion and for what it settles to, period, share of stick and stops in a cycle.
+    """``(motion, long_run, period, share, stops)``: two words, s, share of stick, stops in a cycle.
 
     `of` are what the cycles tell: whether the motion returns, period, share, stops, swing and mean velocity.
     """

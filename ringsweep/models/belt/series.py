@@ -173,7 +173,10 @@ def _cube_term(body, c, k):
 
 @feature("K * load", of=ring.having(belt.OnBelt, "normal_stiffness"))
 def _friction_term(body, c, k, K, load):
-    """Coefficient `k` of friction from that of the friction per load, K; `load` is the reaction if it is constant."""
+    """Coefficient `k` of friction, N, from K, that of the friction per load; `load` is the reaction if it is constant.
+
+    It fills the rows RATIO and NORMAL, so it is called for each `k` in order.
+    """
     c[RATIO, k] = K
     c[NORMAL, k] = ring.held(body, 1.0 if k == 0 else 0.0, (c[X, k], 0.0, 0.0), 0.0, 0.0, 0.0)[0]
     friction = 0.0

@@ -47,7 +47,7 @@ def places_after_edge(scene, mode, rho):
 
 @inlined
 def coefficients_under(scene, mode):
-    """Static and kinetic coefficient under contact 1 and contact 2, in the segments of a mode."""
+    """``(mu_s1, mu_k1, mu_s2, mu_k2)`` in the segments that a mode names."""
     mu_s1, mu_k1, _ = coefficients(scene.surface, mode.place_1[0])
     mu_s2, mu_k2, _ = coefficients(scene.surface, mode.place_2[0])
     return mu_s1, mu_k1, mu_s2, mu_k2

@@ -53,7 +53,10 @@ def _balance_on_ring(scene, mode, t, y, v):
 
 @inlined
 def limit(scene, mode, t, y):
-    """Time to the limit of a jam, s; changes of the sliding velocity and of the gap's angular velocity; reactions."""
+    """``(s, change, tilt, (N1, N2))``: what lies between the state `y` and the limit of a jam.
+
+    Time, s; changes of the sliding velocity, m/s, and of the gap's angular velocity, rad/s; reactions, infinite or 0.
+    """
     share, acceleration, tilt, load_1, load_2 = balance(scene, mode, t, y, y[1])
     nothing = 0.0, 0.0, 0.0, (0.0, 0.0)
     # Where friction has jumped, a run may end with any determinant below zero.

@@ -136,7 +136,7 @@ def record_after(record, shocks, stuck_for, seen, epsilon_omega):
 
 @inlined
 def extremes_of(record, phi, omega, normal_1, normal_2):
-    """What :func:`ringsweep.models.interface.implicit.sought` returns for these values."""
+    """``(value, least, greatest)`` of phi, omega, N1 and N2, as :func:`implicit.sought` returns them."""
     r = record
     return (
         (phi, min(r.phi_min, r.lowest), max(r.phi_max, r.highest)),
@@ -236,7 +236,7 @@ def _enter_record_on_ring(scene, record, t, seen):
 
 @recorder.after_event.implements(Ring)
 def _after_event_on_ring(scene, record, before, mode, t):
-    """Implement :func:`recorder.after_event`: under a smooth law nothing jumps, except at the edge of a zone."""
+    """Implement :func:`recorder.after_event`: under a smooth law the acceleration jumps at the edge of a zone alone."""
     if before.place_1 != mode.place_1 or before.place_2 != mode.place_2:
         return record
     return _with_shocks(record, shock.without_jump(family(scene.law), record.shocks))

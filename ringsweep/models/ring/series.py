@@ -284,7 +284,7 @@ def _status_at_start(drive, scene, mode, t, y):
 
 @inlined
 def _loads_in_slip(scene, mode, t, y):
-    """Determinant of the balances, N1, N2 and their scale (N) in slip, from the balances and not from a series."""
+    """``(determinant, N1, N2, scale of the load)`` in slip, from the balances and not from a series; N."""
     body, (K, motion) = scene.body, friction_and_motion(scene, mode, t, y)
     epsilon, determinant = ring.acceleration(body, *K, motion)
     normal_1, normal_2 = ring.reactions(body, *K, motion)
@@ -329,7 +329,7 @@ def _after_zero_reaction(scene, mode, first, t, y):
 
 @inlined
 def _loads_as_stick_ends(scene, mode, t, y, first):
-    """Normal reactions where that of contact 1, or of contact 2, has vanished in stick; and the size of the load, N."""
+    """``((N1, N2), scale)`` where the reaction of contact 1 (`first`) or 2 has vanished in stick; N."""
     body = scene.body
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)

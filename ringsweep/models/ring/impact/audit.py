@@ -135,7 +135,7 @@ _DISTURBANCE = 1e-14
 
 @audit.disturbed.implements(ImpactRing)
 def _disturbed_restitution(batch):
-    """Implement :func:`audit.disturbed`."""
+    """Implement :func:`audit.disturbed`: flights are in closed form, so only the restitution is disturbed."""
     return batch._replace(restitution=batch.restitution * (1.0 - _DISTURBANCE))
 
 

@@ -126,7 +126,7 @@ def ring_of(scene, turned):
 
 @inlined
 def state_when_closed(psi, v, turned):
-    """State of a body whose contacts hold."""
+    """State of nine numbers of a body whose contacts hold: ``(psi, v, 0, 0, 0, 0, 0, 0, code)``."""
     return psi, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float(TURNED * turned)
 
 

@@ -239,7 +239,10 @@ def _expand_pivot_motion(scene, mode, f, fresh, c):
 
 @inlined
 def _expand_pivot_guards(scene, mode, f, eta, fresh, c):
-    """Fill the gap of the open contact and its guard; in slip also the ends of the region and of the zone."""
+    """Fill the gap of the open contact and its guard; in slip also the bounds of the region and of the zone.
+
+    The rows X and Y hold u and w of the pivot; `eta` is its angle, rad.
+    """
     a, h = side_of(holding(mode)) * scene.balls.half_distance, scene.balls.offset
     gap, guard = (GAP_1, NORMAL_1) if mode.contacts.open == FIRST else (GAP_2, NORMAL_2)
     set_terms(c[gap], (terms(c[Y]) * h - terms(c[X]) * a) * (2.0 * a / (a * a + h * h)))

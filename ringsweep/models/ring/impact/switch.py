@@ -131,7 +131,7 @@ def motion_of(scene, y, ring_omega):
 
 @inlined
 def state_in_flight(motion, turned, gaps):
-    """State of a body without contacts, from the measures of its gaps, m."""
+    """State of nine numbers of a body without contacts; `gaps` are the measures of both gaps, m."""
     code = float(BOTH + TURNED * turned)
     return motion.psi, motion.psi_dot, motion.x, motion.x_dot, motion.y, motion.y_dot, *gaps, code
 
@@ -350,7 +350,16 @@ class _Landing(NamedTuple):
 
 
 class _Impact(NamedTuple):
-    """An impact: both contacts before it, whether they touch, whether they are open after it, and what it does."""
+    """An impact.
+
+    Attributes
+    ----------
+    before : tuple of Contact
+        Both contacts before it.
+    touch, are_open : tuple of bool
+        Whether each contact has no gap, and whether it is open afterwards.
+    found : Impulses
+    """
 
     before: tuple[Contact, Contact]
     touch: tuple[bool, bool]
