@@ -68,3 +68,28 @@ def test_names_of_tests_have_at_most_70_letters():
     for path in Path(__file__).parent.rglob("*.py"):
         names = re.findall(r"def (test_\w+)", path.read_text(encoding="utf-8"))
         assert not [name for name in names if len(name) > 70], path
+
+
+def functions_of_the_core():
+    """Functions, classes and methods of the rooms that kernels are made of, by file; not those within functions."""
+    for room in ROOMS[ROOMS.index("compile") : ROOMS.index("solvers") + 1]:
+        for path in (PACKAGE / room).rglob("*.py"):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+            for node in (*tree.body, *(part for one in classes for part in one.body)):
+                if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                    yield str(path.relative_to(PACKAGE)), node
+
+
+def test_each_function_of_the_core_says_what_it_does():
+    assert not [f"{path}: {node.name}" for path, node in functions_of_the_core() if not ast.get_docstring(node)]
+
+
+def test_no_two_functions_that_implement_hooks_have_one_name():
+    """A stack trace and a search show the name alone: it says of which model the function is."""
+    names = [
+        node.name
+        for _, node in functions_of_the_core()
+        if any(ast.unparse(decorator).partition("(")[0].endswith(".implements") for decorator in node.decorator_list)
+    ]
+    assert not {name for name in names if names.count(name) > 1}

@@ -292,6 +292,7 @@ class _Step(_Writer):
         return self.free - 1
 
     def factors(self, number_of: int, left: str, right: str) -> None:
+        """Write coefficient k of both factors of a product, which inner products of later steps need."""
         self.write(f"l{number_of} = {left}")
         self.write(f"r{number_of} = {right}")
 
