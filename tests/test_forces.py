@@ -352,7 +352,7 @@ class TestAudit:
     def test_energy_has_the_cubic_spring(self):
         scene = self.cell()
         forcing = drives.turn(scene.drive, 0.0)
-        assert audit.energy(scene, forcing, (0.3, 0.7)) == pytest.approx(0.5 * 0.8**2 + 0.5 * 0.09 + 0.5 * 0.3**4)
+        assert audit.energy_of(scene, forcing, (0.3, 0.7)) == pytest.approx(0.5 * 0.8**2 + 0.5 * 0.09 + 0.5 * 0.3**4)
 
     def test_work_of_a_wrong_force_does_not_explain_the_energy(self):
         """A series about a wrong time has a wrong force."""
@@ -361,7 +361,7 @@ class TestAudit:
         for late in (0.0, 0.01):
             c = np.zeros((series.table_shape(scene)[0], COLUMNS))
             with np.errstate(divide="ignore"):
-                longest, _ = series.expand(scene, mode, 0.2 + late, y, 1e-10, c)
+                longest, _ = series.fill_table(scene, mode, 0.2 + late, y, 1e-10, c)
             h = 0.5 * longest
             step = Step(mode, False, 0.2, h, y, series.state_at(scene, c, h))
             scratch = scratch_for(1, 0)._replace(c=c)

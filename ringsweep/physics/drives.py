@@ -783,4 +783,4 @@ def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np
 def largest(force: Any, spans: NDArray[np.float64]) -> Any:
     """About the largest magnitude of forces by formula within spans of time (s), N, of shape ``(cells,)``."""
     knots = getattr(force, "knots", np.empty((len(spans), 0)))
-    return functions_of_time.largest(FORMULAS[type(force)], force._asdict(), knots, spans)
+    return functions_of_time.largest_size(FORMULAS[type(force)], force._asdict(), knots, spans)

@@ -236,7 +236,7 @@ def check(
                 )
 
 
-def largest(function: Function, values: Values, knots: NDArray[np.float64], spans: NDArray[np.float64]) -> Any:
+def largest_size(function: Function, values: Values, knots: NDArray[np.float64], spans: NDArray[np.float64]) -> Any:
     """About the largest magnitude of a function, of shape ``(cells,)``; see :func:`check`."""
     times = _SHARES[:, None] * spans
     return np.broadcast_to(abs(evaluate(function.value, times, values, list(knots.T))), times.shape).max(axis=0)

@@ -87,13 +87,13 @@ def _energies_in_series(family, scene, step, scratch):
     """Energies at both ends of a step, J."""
     after = drives.turn(scene.drive, later(step.now, step.s))
     before = drives.turn(scene.drive, step.now)
-    return audit_of_model.energy(scene, before, step.y), audit_of_model.energy(scene, after, step.y_next)
+    return audit_of_model.energy_of(scene, before, step.y), audit_of_model.energy_of(scene, after, step.y_next)
 
 
 def _energies_in_implicit_step(family, scene, step, scratch):
     """Energies at both ends of an implicit step, J."""
     (before, _), (after, _) = _ends(scene, step, scratch)
-    return audit_of_model.energy(scene, before, step.y), audit_of_model.energy(scene, after, step.y_next)
+    return audit_of_model.energy_of(scene, before, step.y), audit_of_model.energy_of(scene, after, step.y_next)
 
 
 _violation = either(_violation_in_series, _violation_in_implicit_step)

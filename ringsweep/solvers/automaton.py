@@ -209,7 +209,7 @@ def _begin_record(family, scene, mode, now, y, tolerances, c):
 @_begin_record.implements(SetValued, Smooth)
 def _begin_by_series(family, scene, mode, now, y, tolerances, c):
     """Implement :func:`_begin_record`."""
-    series.expand(scene, mode, now, y, tolerances[0], c)
+    series.fill_table(scene, mode, now, y, tolerances[0], c)
     return recorder.begin(scene, now.t, series.seen_at_start(scene, c))
 
 
@@ -334,7 +334,7 @@ def integrate(batch, tolerances, max_steps, results, history):
         Cells, as :func:`ringsweep.models.batch` makes them.
     tolerances : tuple of float
         Relative error allowed to a step of the series, and to an implicit step; see
-        :func:`ringsweep.models.interface.series.expand`.
+        :func:`ringsweep.models.interface.series.fill_table`.
     max_steps : int
         Steps after which a run is given up as failed. It is given up before if :data:`PATIENCE` steps gain so little
         time that it would not end within `max_steps`.

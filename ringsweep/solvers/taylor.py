@@ -106,7 +106,7 @@ def series_step(scene, run, h_max, tolerance, scratch):
         units of the tolerance, if a run at a looser tolerance takes the same step, 0 otherwise.
     """
     c = scratch.c
-    longest, reach = series.expand(scene, run.mode, run.now, run.y, tolerance, c)
+    longest, reach = series.fill_table(scene, run.mode, run.now, run.y, tolerance, c)
     run = _with_record(run, enter_series(variation.asked(scene), scene, run.record, run.mode, c))
     h = min(longest, h_max)
     guard, s = _first_event_of_series(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)

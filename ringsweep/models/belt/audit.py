@@ -76,9 +76,9 @@ def _terms(body, motion, forcing):
     return body.gravity + ring.size(body, motion) / body.mass + abs(forcing[2]) + 1e-200
 
 
-@audit.energy.implements(Belt, BristleBelt)
+@audit.energy_of.implements(Belt, BristleBelt)
 def _energy_on_belt(scene, forcing, y):
-    """Implement :func:`audit.energy`: of the body and of the spring."""
+    """Implement :func:`audit.energy_of`: of the body and of the spring."""
     # The momentum in a dead band moves with the belt.
     hidden = y[1] - moving(scene, y[1], y[1], 0.0)
     return ring.energy(scene.body, (y[0], 0.0, y[1] + forcing[1])) - 0.5 * scene.body.mass * hidden * hidden

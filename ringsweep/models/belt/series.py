@@ -185,9 +185,9 @@ def _friction_term(body, c, k, K, load):
     return friction
 
 
-@series.expand.implements(belt.Belt)
-def _expand_on_belt(scene, mode, t, y, tolerance, c):
-    """Implement :func:`series.expand`: fill all rows of the table, in stick, in a dead band, or in slip."""
+@series.fill_table.implements(belt.Belt)
+def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
+    """Implement :func:`series.fill_table`: fill all rows of the table, in stick, in a dead band, or in slip."""
     drives.expand_at(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
     body = scene.body
     if if_force(body, True, False):

@@ -1,7 +1,7 @@
 """Whether a run obeys its friction law, checked with formulas that the solver did not use.
 
-Who calls: ``ringsweep/solvers/audit.py`` calls ``violation`` and ``energy`` in kernels, after steps; ``event.py`` and
-``certificate.py`` call the others in Python, after all runs of a batch.
+Who calls: ``ringsweep/solvers/audit.py`` calls ``violation`` and ``energy_of`` in kernels, after steps; ``event.py``
+and ``certificate.py`` call the others in Python, after all runs of a batch.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ def violation(scene, mode, forcing, y, rates, s, tolerance):
         ``(violation, power)``. ``violation`` is the largest violation of the friction law, of the balances of momentum
         and of the signs of the reactions. Each is divided by the violation that the tolerance would explain; infinite
         if a number is not finite. ``power`` is the power, W, of friction and of all forces on the body that
-        :func:`energy` leaves out.
+        :func:`energy_of` leaves out.
     """
 
 
 @hook
-def energy(scene, forcing, y):
+def energy_of(scene, forcing, y):
     """Mechanical energy of the body, and of the spring if there is one.
 
     Parameters
@@ -175,4 +175,4 @@ def of_events(batch, one):
 
 
 #: Functions without a default.
-MEMBERS = (violation, energy)
+MEMBERS = (violation, energy_of)

@@ -4,8 +4,8 @@ A step fills a table of shape ``(rows, columns)``. Each row is a power series in
 step: coefficient k is in column k, for k up to :data:`ringsweep.numerics.series.ORDER`. The model chooses the rows; the
 last ones are the guards of the mode. States are those of :mod:`modes`.
 
-Who calls: ``ringsweep/solvers/taylor.py`` in each step: first ``expand``, then the others, which read the table. The
-audit and the history of a run read it too, after the step.
+Who calls: ``ringsweep/solvers/taylor.py`` in each step: first ``fill_table``, then the others, which read the table.
+The audit and the history of a run read it too, after the step.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def table_shape(scene):
 
 
 @hook
-def expand(scene, mode, t, y, tolerance, c):
+def fill_table(scene, mode, t, y, tolerance, c):
     """Fill the table with the power series about a state.
 
     Parameters
@@ -161,4 +161,4 @@ def extremes(scene, record, mode, c, h, work):
 
 
 #: Functions without a default.
-MEMBERS = (expand, state_at, rates_at, seen_at_start, seen_at, extremes)
+MEMBERS = (fill_table, state_at, rates_at, seen_at_start, seen_at, extremes)

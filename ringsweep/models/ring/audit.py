@@ -87,9 +87,9 @@ def _violation_on_ring(scene, mode, forcing, y, rates, s, tolerance):
     return larger(largest, violation), power
 
 
-@audit.energy.implements(ring.Ring)
+@audit.energy_of.implements(ring.Ring)
 def _energy_on_ring(scene, forcing, y):
-    """Implement :func:`audit.energy`."""
+    """Implement :func:`audit.energy_of`."""
     return ring.energy(scene.body, (sin(y[0]), cos(y[0]), y[1] / scene.body.radius + forcing[1]))
 
 
@@ -104,9 +104,9 @@ def _audited_on_bristle_ring(scene, mode, forcing, y):
     return now, terms, inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
 
 
-@audit.energy.implements(ring.BristleRing)
+@audit.energy_of.implements(ring.BristleRing)
 def _energy_on_bristle_ring(scene, forcing, y):
-    """Implement :func:`audit.energy`; the place in the state is the angle in the ring's frame."""
+    """Implement :func:`audit.energy_of`; the place in the state is the angle in the ring's frame."""
     phi = y[0] + forcing[0]
     return ring.energy(scene.body, (sin(phi), cos(phi), y[1] / scene.body.radius + forcing[1]))
 

@@ -400,9 +400,9 @@ def slip_after(law, mode, guard, v, mu_s):
     return with_slip(mode, 0, KINETIC, -1), 0.0
 
 
-@series.expand.implements(ring.Ring)
-def _expand_on_ring(scene, mode, t, y, tolerance, c):
-    """Implement :func:`series.expand`: fill all rows of the table, in stick or in slip."""
+@series.fill_table.implements(ring.Ring)
+def _fill_table_on_ring(scene, mode, t, y, tolerance, c):
+    """Implement :func:`series.fill_table`: fill all rows of the table, in stick or in slip."""
     drives.expand_at(scene.drive, t, ORDER + 2, c[THETA], c[FACTORS:])
     c[PHI, 0] = y[0]
     c[V, 0] = y[1]
@@ -540,7 +540,7 @@ def _expand_slip_guards(scene, mode, c):
 
 @inlined
 def _expand_stick(scene, mode, tolerance, c):
-    """Fill the series of stick and return what :func:`series.expand` does; the body moves with the ring.
+    """Fill the series of stick and return what :func:`series.fill_table` does; the body moves with the ring.
 
     The guards are the reactions; the reserves of friction, N, before forward slip (SLOW) and before backward slip
     (FAST), see :func:`contact.sharing`; and for two contacts EDGE, the discriminant of the quadratic equation, or the

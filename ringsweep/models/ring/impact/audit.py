@@ -97,9 +97,9 @@ def _violation_of_pivot(scene, mode, forcing, y, rates, s, tolerance):
     return largest, along * (v + body.radius * ring_omega)
 
 
-@audit.energy.implements(ImpactRing)
+@audit.energy_of.implements(ImpactRing)
 def _energy_with_impact(scene, forcing, y):
-    """Implement :func:`audit.energy`."""
+    """Implement :func:`audit.energy_of`."""
     body, motion = scene.closed.body, motion_of(scene, y, forcing[1])
     spin = 0.0 if ring.contact_count(body) == 1 else inertia(body) * motion.psi_dot * motion.psi_dot
     speed = motion.x_dot * motion.x_dot + motion.y_dot * motion.y_dot

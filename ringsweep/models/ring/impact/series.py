@@ -89,12 +89,12 @@ def _table_shape_with_impact(scene):
     return series.table_shape(scene.closed)
 
 
-@series.expand.implements(ImpactRing)
-def _expand_with_impact(scene, mode, t, y, tolerance, c):
-    """Implement :func:`series.expand`: as the closed ring, as a pivot, or as a flight."""
+@series.fill_table.implements(ImpactRing)
+def _fill_table_with_impact(scene, mode, t, y, tolerance, c):
+    """Implement :func:`series.fill_table`: as the closed ring, as a pivot, or as a flight."""
     c[KIND, 0] = y[-1]
     if mode.contacts.open == NONE:
-        return series.expand(ring_of(scene, mode.contacts.turned), mode, t, (y[0], y[1]), tolerance, c)
+        return series.fill_table(ring_of(scene, mode.contacts.turned), mode, t, (y[0], y[1]), tolerance, c)
     drives.expand_at(scene.drive, t, ORDER + 2, c[THETA], c[FACTORS:])
     if mode.contacts.open == BOTH:
         return _expand_flight(scene, mode, y, tolerance, c)
@@ -148,7 +148,7 @@ def _fill_constant(row, number):
 
 @inlined
 def _expand_pivot(scene, mode, t, y, tolerance, c):
-    """Fill the series of a pivot and return what :func:`series.expand` does."""
+    """Fill the series of a pivot and return what :func:`series.fill_table` does."""
     body, balls = scene.closed.body, scene.balls
     fresh = (mode.contacts.zeros_1 if mode.contacts.open == FIRST else mode.contacts.zeros_2) if y[2] == 0.0 else 0
     c[PHI, 0], c[V, 0], c[ETA, 0] = y[0], y[1], y[2]
@@ -298,7 +298,7 @@ def _divide(c, row, quotient, zeros):
 
 @inlined
 def _expand_flight(scene, mode, y, tolerance, c):
-    """Fill the series of a parabola with constant spin, and of both gaps; return what :func:`series.expand` does."""
+    """Fill the series of a parabola with constant spin, and of the gaps; return what :func:`series.fill_table` does."""
     body, balls = scene.closed.body, scene.balls
     psi, spin, x, x_dot, y_0, y_dot, _, _, _ = y
     for row in (X, Y):
