@@ -6,9 +6,10 @@ have the cells as first dimension. Nothing here runs in kernels.
 
 from __future__ import annotations
 
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, cached_property
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,8 @@ _SHRUNK = 0.2
 _ROUNDING = 1e-15
 
 
-class TwoRuns(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class TwoRuns:
     """Two runs of each cell, at different resolutions.
 
     Attributes
@@ -81,9 +83,30 @@ class TwoRuns(NamedTuple):
     second_rows: NDArray[np.float64]
     outcomes: tuple[str, ...]
 
-    def named(self, rows: NDArray[np.float64]) -> SimpleNamespace:
-        """Outcomes of some runs by name."""
-        return SimpleNamespace(**dict(zip(self.outcomes, rows.T, strict=True)))
+    @cached_property
+    def named(self) -> tuple[SimpleNamespace, SimpleNamespace]:
+        """Outcomes by name, of the runs and of the second runs."""
+        one, other = (dict(zip(self.outcomes, rows.T, strict=True)) for rows in (self.rows, self.second_rows))
+        return SimpleNamespace(**one), SimpleNamespace(**other)
+
+    @cached_property
+    def differences(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Differences between both runs in the numbers that have a bound on their error, and the scale of each."""
+        names = with_errors(self.outcomes)
+        columns = [self.outcomes.index(name) for name in names]
+        a = self.rows[:, columns]
+        with np.errstate(invalid="ignore", over="ignore"):
+            difference = np.abs(a - self.second_rows[:, columns])
+        # A reaction that is infinite before a jam is no scale of the others.
+        sizes = np.where(np.isinf(a), np.nan, np.abs(a))
+        units = np.array([OUTCOMES[name].units for name in names])
+        scale, own_scales = np.empty_like(a), {"s": self.batch.span} | least_scales(self.batch)
+        for unit in set(units.tolist()):
+            of_unit = units == unit
+            largest = np.fmax.reduce(sizes[:, of_unit], axis=1, initial=0.0)
+            least = own_scales.get(unit, 0.0 if unit[0] in "mNJ" or unit == "rad s-2" else 1.0)
+            scale[:, of_unit] = (largest + least)[:, None]
+        return difference, scale
 
 
 def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
@@ -128,13 +151,12 @@ def judged(
         Values of :data:`ringsweep.quantities.variables.DOUBTS`, ``CERTIFIED`` where nothing speaks against the
         certificate; and what :func:`errors` returns, NaN where runs diverge.
     """
-    batch, rows, second_rows, outcomes = runs
-    one, other = runs.named(rows), runs.named(second_rows)
+    batch, rows, outcomes, (one, other) = runs.batch, runs.rows, runs.outcomes, runs.named
     needed = [column for column, name in enumerate(outcomes) if name not in _MAY_LACK]
     chaotic = diverge & ~same_statistics(batch, one, other) if diverge.any() else diverge
     reasons = {
         NO_RESULT: one.regime == FAILED,
-        ANSWERS_DIFFER: ~agree(rows, second_rows, outcomes),
+        ANSWERS_DIFFER: ~agree(rows, runs.second_rows, outcomes),
         LAW_NOT_OBEYED: of_events(batch, one)[0] | of_events(batch, other)[0],
         CLOSE_CALL: undecided(batch, one, other, fall_rates),
         NOT_FINITE: ~np.isfinite(rows[:, needed]).all(axis=1),
@@ -154,9 +176,9 @@ def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
     """
     ends = [column for column, name in enumerate(with_errors(runs.outcomes)) if name.endswith("_end")]
     # The time for which it sticks is a sum, which is rounded.
-    one = runs.named(runs.rows)
+    one, _ = runs.named
     stuck = np.isclose(one.stick_time, one.t_end, rtol=1e-12, atol=0.0)
-    difference, scale = _differences(runs)
+    difference, scale = runs.differences
     with np.errstate(invalid="ignore"):
         same = (difference <= _SAME * scale)[:, ends].all(axis=1)
     return np.asarray(same & ~stuck)
@@ -164,7 +186,7 @@ def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
 
 def apart(runs: TwoRuns) -> NDArray[np.float64]:
     """Largest difference between both runs of each cell in any number, relative to the scale of the number."""
-    difference, scale = _differences(runs)
+    difference, scale = runs.differences
     # Laps of other lengths, and forces at other events, are no measure of divergence.
     lasting = [k for k, name in enumerate(with_errors(runs.outcomes)) if name not in ("period", *_FORCES)]
     return _largest(difference[:, lasting], scale[:, lasting])
@@ -235,7 +257,7 @@ def errors(
         Each in the unit of its outcome; NaN where :func:`agree` is false.
     """
     names = with_errors(runs.outcomes)
-    difference, scale = _differences(runs)
+    difference, scale = runs.differences
     with np.errstate(invalid="ignore", over="ignore"):
         of_motion = [k for k, name in enumerate(names) if name not in _FORCES]
         least = share * _largest(difference[:, of_motion], scale[:, of_motion])[:, None] * scale
@@ -249,34 +271,16 @@ def errors(
             if names[k] in _FORCES:
                 bound[:, k] += force_floor * scale[:, k]
     # A run that reaches the end of the span has an exact time of its end.
-    one = runs.named(runs.rows)
+    one, _ = runs.named
     reached = one.regime == one.motion
     bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
-    bound[~agree(*runs[1:])] = np.nan
+    bound[~agree(runs.rows, runs.second_rows, runs.outcomes)] = np.nan
     return bound
-
-
-def _differences(runs: TwoRuns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Differences between both runs of each cell, and the scale of each number."""
-    names = with_errors(runs.outcomes)
-    columns = [runs.outcomes.index(name) for name in names]
-    a = runs.rows[:, columns]
-    with np.errstate(invalid="ignore", over="ignore"):
-        difference = np.abs(a - runs.second_rows[:, columns])
-    units = np.array([OUTCOMES[name].units for name in names])
-    scale, own_scales = np.empty_like(a), {"s": runs.batch.span} | least_scales(runs.batch)
-    for unit in set(units.tolist()):
-        of_unit = units == unit
-        # A reaction that is infinite before a jam is no scale of the others.
-        largest = np.nanmax(np.abs(np.where(np.isinf(a), np.nan, a)[:, of_unit]), axis=1, initial=0.0)
-        scale[:, of_unit] = (largest + own_scales.get(unit, 0.0 if unit[0] in "mNJ" or unit == "rad s-2" else 1.0))[
-            :, None
-        ]
-    return difference, scale
 
 
 def _largest(difference: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
     """Largest relative difference of each cell."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        found: NDArray[np.float64] = np.nanmax(np.where(scale > 0.0, difference / scale, 0.0), axis=1, initial=0.0)
+        relative = np.where(scale > 0.0, difference / scale, 0.0)
+        found: NDArray[np.float64] = np.fmax.reduce(relative, axis=1, initial=0.0)
     return found

@@ -185,7 +185,7 @@ class _Piecewise(Method):
             force_floor = _SHARE_OF_REACTIONS * REACTION_TOLERANCE * remainder
             floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
-        _, magnified, left_out = audit.of_events(batch, runs.named(runs.rows))
+        _, magnified, left_out = audit.of_events(batch, runs.named[0])
         is_constant = family_of(type(batch.law)) is SetValued and not varies(take(batch, 0).law, 0)
         safety, share = _SAFETY_AND_SHARE["constant" if is_constant else "bristles" if of_bristles else "varying"]
         because, bounds = judged(
