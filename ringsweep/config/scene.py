@@ -300,14 +300,15 @@ class _Keys:
     ):
         self.model, self.moved, self.own, self.zones = model, moved, own, zones
         paths = dict.fromkeys(path for drive in drives for path in _structural(model, drive, laws))
-        known = [law for law in laws if law in MODELS[model].laws or law in own]
+        taken = {*MODELS[model].laws, *own}
+        known = [law for law in laws if law in taken]
+        common = {"impact": model in WITH_IMPACT, "elsewhere": ELSEWHERE[0] if moved is None else moved.elsewhere}
         # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take long.
         for law, drive, arcs in (
             *product(known, ("none",), ((), ("zone",), zones)),
             *product(known[:1], (drive for drive in drives if drive in DRIVES), ((),)),
         ):
-            one = Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT)
-            one = replace(one, elsewhere=moved.elsewhere if moved is not None else ELSEWHERE[0])
+            one = Structure(model, law, drive, arcs, own_law=own.get(law), **common)
             paths |= dict.fromkeys(_paths_under(one, model_of(one), one.law_type, one.drive_type))
         if moved is not None:
             paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))
