@@ -302,7 +302,10 @@ class _Keys:
         paths = dict.fromkeys(path for drive in drives for path in _structural(model, drive, laws))
         taken = {*MODELS[model].laws, *own}
         known = [law for law in laws if law in taken]
-        common = {"impact": model in WITH_IMPACT, "elsewhere": ELSEWHERE[0] if moved is None else moved.elsewhere}
+        common: dict[str, Any] = {
+            "impact": model in WITH_IMPACT,
+            "elsewhere": ELSEWHERE[0] if moved is None else moved.elsewhere,
+        }
         # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take long.
         for law, drive, arcs in (
             *product(known, ("none",), ((), ("zone",), zones)),
