@@ -7,6 +7,7 @@ replicate have to do with each other (A. B. Owen, Practical Quasi-Monte Carlo In
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -34,8 +35,9 @@ DISTRIBUTIONS = {
 }
 
 
+@lru_cache(maxsize=64)
 def distribution(kind: str, *numbers: float) -> Any:
-    """A distribution of :data:`DISTRIBUTIONS` as SciPy has it."""
+    """A distribution of :data:`DISTRIBUTIONS` as SciPy has it: made once, since SciPy writes its documentation too."""
     # It is slow to import, and only samples need it.
     from scipy import stats
 
