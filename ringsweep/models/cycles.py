@@ -9,9 +9,9 @@ count as equal: a motion that only comes near its past is not taken for a period
 The place x of the body is a displacement, or an angle on a ring; lengths in m are then angles in rad.
 
 Throughout, `c` is a :class:`Cycles`, `swing` the distance between the extremes of a cycle, and `fast` the velocity
-that belongs to it: ``2 pi`` times the swing over the natural period, m/s. `forced` says that something excites the
-motion, `growth` is the largest exponent and its error, 1/s. The records of the belt and of the ring call these
-functions at each observation, and at the end of a run.
+that belongs to it: ``2 pi`` times the swing over the natural period or that of the forcing, whichever is shorter,
+m/s. `forced` says that something excites the motion, `growth` is the largest exponent and its error, 1/s. The records
+of the belt and of the ring call these functions at each observation, and at the end of a run.
 """
 
 from __future__ import annotations

@@ -339,7 +339,7 @@ def _jerk_of_power(drive, t):
 
 @jerk.implements(Table)
 def _jerk_of_table(drive, t):
-    """Implement :func:`jerk`; at a knot that of the interval behind it."""
+    """Implement :func:`jerk`; at a knot that of the interval after it."""
     return 6.0 * drive.amplitude * _cubic(drive, t)[3]
 
 

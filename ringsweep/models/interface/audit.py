@@ -1,7 +1,8 @@
 """Whether a run obeys its friction law, checked with formulas that the solver did not use.
 
-Who calls: ``ringsweep/solvers/audit.py`` calls ``violation`` and ``energy_of`` in kernels, after steps; ``event.py``
-and ``certificate.py`` call the others in Python, after all runs of a batch.
+Who calls: in kernels ``ringsweep/solvers/audit.py`` calls ``violation`` and ``energy_of`` after steps, and
+``automaton.py`` calls ``is_reaction`` at the end of a run. In Python ``event.py`` and ``certificate.py`` call the
+others, after all runs of a batch.
 """
 
 from __future__ import annotations

@@ -9,8 +9,9 @@ The state holds the place, the sliding velocity in m/s, and the deflection (m) o
 any. The place is an angle (rad) or a displacement (m). The state holds the sliding velocity, not the velocity in space,
 because the difference of two large velocities would lose all its digits.
 
-Who calls: ``ringsweep/solvers/automaton.py``. ``begin`` once at launch, ``switch`` at each event, ``in_space`` and
-``limit_of_jam`` at the end, ``row`` for a history only.
+Who calls: ``ringsweep/solvers/automaton.py``. ``begin`` once at launch, ``switch`` and ``first_loss`` at each event,
+``in_space`` and ``limit_of_jam`` at the end, ``row`` for a history only; ``taylor.py`` and ``creep.py`` call
+``sticks`` in each step.
 """
 
 from __future__ import annotations

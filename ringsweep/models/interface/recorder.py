@@ -5,8 +5,9 @@ these are angle, angular velocity and both normal reactions; for the belt displa
 functions ``constant_step.seen``, ``series.seen_at`` and ``implicit.seen`` make the tuples.
 
 Who calls: ``automaton.py``, ``taylor.py``, ``creep.py`` and ``rk4.py`` of the solvers. ``begin`` once at launch,
-``observe`` after each interval, ``conclude`` once at the end; solvers that locate events call ``enter`` at the
-beginning of each step, and ``after_event`` after each event.
+``observe`` after each interval; ``conclude`` and ``keep_memory`` once at the end. Solvers that locate events call
+``lend`` after ``begin``, ``enter`` at the beginning of each step, ``after_event`` after each event, and ``at_jam``
+after a jam.
 """
 
 from __future__ import annotations

@@ -655,7 +655,7 @@ def _extremes_on_ring(scene, record, mode, c, h, work):
 
 @modes.row.implements(ring.Ring, ring.BristleRing)
 def _row_on_ring(scene, mode, forcing, y, seen):
-    """Implement :func:`modes.row`: the columns of ``RingModel.history``, then the deflections of bristles."""
+    """Implement :func:`modes.row`: the columns of ``Model.history``; the last ones are deflections of bristles."""
     phi, omega, normal_1, normal_2, located = seen[:5]
     places, state = zones_of(scene, mode.place_1, mode.place_2), 0.0 if mode.region < 0 else float(mode.sign)
     return phi, omega, located.acceleration, normal_1, normal_2, forcing[1], *places, state, *y[2:]
