@@ -115,6 +115,12 @@ class TestBoundaries:
         assert counts[2] < 2.4 * counts[1] < 2.4**2 * counts[0]
         assert counts[2] < 0.02 * 1024**2
 
+    def test_strip_narrower_than_two_cells_is_followed_without_an_audit(self):
+        y, x = plane()
+        for width, waves, height in ((0.002, 0.5, 0.3), (0.002, 9.0, 0.05), (0.004, 5.0, 0.45)):
+            truth = (np.abs(y - 0.5 - height * np.sin(waves * x)) < width).astype(int)
+            assert not wrong(refined(truth, audit=0.0)[0], truth).any()
+
     def test_all_around_a_cell_that_is_not_certain_is_computed(self):
         truth, certain = np.zeros((65, 65), dtype=int), np.ones((65, 65), dtype=bool)
         certain[32, 20:45] = False
