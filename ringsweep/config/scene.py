@@ -79,7 +79,9 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     names, own, curve = _read_friction(doc, scene, model, laws)
     moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
-    keys = _Keys(model, dict.fromkeys([*law_choice(model, own).names]), own, zones or ("zones.0",), moved)
+    known = law_choice(model, own).names
+    registered = MODELS[model], WITH_IMPACT.get(model), *map(LAWS.get, known), *DRIVES.values()
+    keys = _keys(model, known, tuple(own.items()), zones or ("zones.0",), moved, *registered)
     leaves = dict(keys.leaves(scene, names))
     if not names:
         section_of(scene, "friction", "scene.")
@@ -272,12 +274,6 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
         yield from (f"{section}.{key}" for key in keys)
 
 
-@lru_cache(maxsize=4096)
-def _paths_under(structure: Structure, *registered: Any) -> tuple[str, ...]:
-    """Paths of the numbers of a scene, for as long as the same types are registered under its names."""
-    return tuple(parameters(structure))
-
-
 class _Keys:
     """Keys that a scene of a model can have, under some laws and some drives.
 
@@ -312,7 +308,7 @@ class _Keys:
             *product(known[:1], (drive for drive in drives if drive in DRIVES), ((),)),
         ):
             one = Structure(model, law, drive, arcs, own_law=own.get(law), **common)
-            paths |= dict.fromkeys(_paths_under(one, model_of(one), one.law_type, one.drive_type))
+            paths |= dict.fromkeys(parameters(one))
         if moved is not None:
             paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))
         self.known = set(paths)
@@ -371,3 +367,16 @@ class _Keys:
         """Paths whose last key is `key`, as text; those of a list of zones are left out."""
         found = [path for path in self.known if path.rpartition(".")[2] == key and not path.startswith("zones.")]
         return " or ".join(f"`{path}`" for path in sorted(found))
+
+
+@lru_cache(maxsize=16)
+def _keys(
+    model: str,
+    laws: tuple[str, ...],
+    own: tuple[tuple[str, type], ...],
+    zones: tuple[str, ...],
+    moved: Structure,
+    *registered: Any,
+) -> _Keys:
+    """Keys of a scene, found once for as long as the same types are registered under its names."""
+    return _Keys(model, laws, dict(own), zones, moved)
