@@ -4,19 +4,16 @@ The bounds are rigorous: every operation rounds outwards. They are wider than th
 interval does not know that it stands in two places; narrow intervals of the speed have narrow bounds. See R. E. Moore,
 R. B. Kearfott, M. J. Cloud, Introduction to Interval Analysis (SIAM, 2009).
 
-Derivatives are those of the power series in the speed: coefficient `k` of a function on an interval bounds its `k`-th
-derivative divided by k!.
-
-None in place of an interval is zero, exactly. `partial` marks intervals on a part of which the function is not
-defined. A series is a list of intervals, from the value up. :mod:`isolation` calls :class:`Enclosure`; nothing here
-runs in kernels.
+Bounds on a derivative are those of its expression, in a form in which as little as possible cancels. `partial` marks
+intervals on a part of which the function is not defined. :mod:`isolation` calls :class:`Enclosure`; nothing here runs in
+kernels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cache
-from itertools import chain, zip_longest
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,12 +24,12 @@ from ringsweep.numerics.expressions import (
     SPEED,
     ZERO,
     Node,
+    derivative,
+    divide,
+    function,
     negative,
     nodes_of,
     number,
-    quotient_of,
-    rebuilt,
-    symbol,
 )
 from ringsweep.numerics.expressions import add as plus
 from ringsweep.numerics.expressions import multiply as times
@@ -61,10 +58,6 @@ class Interval(NamedTuple):
     low: Any
     high: Any
     partial: Any = None
-
-
-#: Power series: a coefficient that is None is exactly zero.
-Series = list[Interval | None]
 
 
 def exact(value: Any) -> Interval:
@@ -125,11 +118,6 @@ def inverse(a: Interval) -> Interval:
     return _outward(low, high, _either(a.partial, meets if meets.any() else None))
 
 
-def scaled(a: Interval, factor: float) -> Interval:
-    """Product with a number."""
-    return multiply(a, exact(factor))
-
-
 def _monotone(function: Any, least: float = -np.inf, most: float = np.inf) -> Any:
     """Extension of an increasing function of the library of mathematics with values between two numbers."""
 
@@ -144,7 +132,11 @@ def _monotone(function: Any, least: float = -np.inf, most: float = np.inf) -> An
     return apply
 
 
-_exp, _tanh, _atan = _monotone(np.exp, 0.0), _monotone(np.tanh, -1.0, 1.0), _monotone(np.arctan)
+def _bounded_exp(a: Interval, beyond: float) -> Interval:
+    """Exponential, which is `beyond` where it would be greater than a finite number."""
+    low, high, partial = _monotone(np.exp, 0.0)(a)
+    overflows = a.low > _LARGEST_EXPONENT
+    return Interval(np.where(overflows, beyond, low), np.where(overflows, beyond, high), partial)
 
 
 def _on_domain(a: Interval) -> tuple[Any, Any, Any]:
@@ -204,110 +196,26 @@ def _decay(a: Interval) -> Interval:
     return Interval(np.maximum(low, 0.0), high, partial)
 
 
-# ---- power series -----------------------------------------------------------------------------
+#: Values on intervals, by the kind of a node. Beyond the rates of :data:`FUNCTIONS`, ``decay`` is that of tanh, and
+#: ``growth`` that of exp.
+_VALUES: dict[str, Callable[..., Interval]] = {
+    "add": add,
+    "multiply": multiply,
+    "divide": lambda a, b: multiply(a, inverse(b)),
+    "power": _power,
+    "exp": partial(_bounded_exp, beyond=_HUGE),
+    "growth": partial(_bounded_exp, beyond=0.0),
+    "tanh": _monotone(np.tanh, -1.0, 1.0),
+    "decay": _decay,
+    "atan": _monotone(np.arctan),
+    "sqrt": _sqrt,
+    "log": _log,
+    "minimum": partial(_extreme, np.minimum),
+    "maximum": partial(_extreme, np.maximum),
+}
 
 
-def _sum(terms: list[Interval | None]) -> Interval | None:
-    """Sum of intervals; None stands for zero."""
-    found = None
-    for term in terms:
-        found = term if found is None else found if term is None else add(found, term)
-    return found
-
-
-def _product(a: Interval | None, b: Interval | None, factor: float = 1.0) -> Interval | None:
-    """Product of two intervals and a number; None stands for zero."""
-    if a is None or b is None:
-        return None
-    found = multiply(a, b)
-    return found if factor == 1.0 else scaled(found, factor)
-
-
-def _product_series(a: Series, b: Series) -> Series:
-    """Power series of a product."""
-    if a is not b:
-        return [_sum([_product(a[j], b[k - j]) for j in range(k + 1)]) for k in range(len(a))]
-    found = []
-    for k in range(len(a)):
-        terms = [_product(a[j], a[k - j], 2.0) for j in range((k + 1) // 2)]
-        middle = a[k // 2] if k % 2 == 0 else None
-        found.append(_sum([*terms, None if middle is None else square(middle)]))
-    return found
-
-
-def _minus(a: Interval | None) -> Interval | None:
-    """Negative of an interval; None stands for zero."""
-    return None if a is None else Interval(-a.high, -a.low, a.partial) if a.low is not a.high else exact(-a.low)
-
-
-def _quotient_series(a: Series, b: Series) -> Series:
-    """Power series of a quotient; that of the divisor begins with a number."""
-    assert b[0] is not None
-    per = inverse(b[0])
-    found: Series = []
-    for k in range(len(a)):
-        rest = _sum([_product(b[j], found[k - j]) for j in range(1, k + 1)])
-        found.append(_product(_sum([a[k], _minus(rest)]), per))
-    return found
-
-
-def _replaced(a: Interval | None, where: Any, value: float) -> Interval | None:
-    """Interval with another value for both bounds where the condition holds."""
-    return a if a is None else Interval(np.where(where, value, a.low), np.where(where, value, a.high), a.partial)
-
-
-def _scaled_or_zero(a: Interval | None, k: float) -> Interval | None:
-    """Interval times a number; None stands for zero."""
-    return a if a is None or k == 1.0 else scaled(a, k)
-
-
-def _series_of(node: Node, parts: list[Series], order: int) -> Series:
-    """Power series of a node from those of its parts, with `order` + 1 coefficients."""
-    a = parts[0]
-    if node.kind == "add":
-        return [_sum([x, y]) for x, y in zip(*parts, strict=True)]
-    if node.kind == "multiply":
-        return _product_series(a, a if node.parts[0] is node.parts[1] else parts[1])
-    if node.kind == "divide":
-        return _quotient_series(a, parts[1])
-    inner = a[0] if a[0] is not None else exact(0.0)
-    found: Series = [_VALUES[node.kind](inner, *(part[0] or exact(0.0) for part in parts[1:]))]
-    function = rebuilt(node, list(_ARGUMENTS[: len(parts)]))
-    above, below = quotient_of(function)
-    known = {function: found, **dict(zip(_ARGUMENTS, parts, strict=False))}
-    for k in range(1, order + 1):
-        n, q = _among(above, known, k - 1), _among(below, known, k - 1)
-        if node.kind == "tanh":
-            n[0] = _decay(inner)
-        assert q[0] is not None
-        rate = _sum([_product(_scaled_or_zero(a[j], j), n[k - j]) for j in range(1, k + 1)])
-        rest = _sum([_product(_scaled_or_zero(found[j], j), q[k - j]) for j in range(1, k)])
-        term = _over(_sum([rate, _minus(rest)]), k)
-        found.append(term if below is ONE else _product(term, inverse(q[0])))
-    if node.kind == "exp" and (overflows := inner.low > _LARGEST_EXPONENT).any():
-        return [_replaced(c, overflows, 0.0 if k else _HUGE) for k, c in enumerate(found)]
-    return found
-
-
-# What stands for the argument of a function, and for the exponent of a power.
-_ARGUMENTS = SPEED, symbol("exponent")
-
-#: Values of functions on an interval.
-_VALUES = {"exp": _exp, "tanh": _tanh, "atan": _atan, "sqrt": _sqrt, "log": _log, "power": _power}
-
-
-def _among(node: Node, known: Mapping[Node, Series], order: int) -> Series:
-    """Power series of an expression whose nodes `known` have series, up to the power `order`."""
-    if node in known:
-        return known[node][: order + 1]
-    if node.kind == "number":
-        return [exact(node.value), *[None] * order]
-    return _series_of(node, [_among(part, known, order) for part in node.parts], order)
-
-
-def _over(a: Interval | None, k: int) -> Interval | None:
-    """Interval divided by a positive whole number; None stands for zero."""
-    return a if a is None or k == 1 else _outward(a.low / k, a.high / k, a.partial)
+# ---- derivatives ------------------------------------------------------------------------------
 
 
 # Polynomials with more coefficients are not multiplied out.
@@ -335,11 +243,10 @@ def _polynomial(node: Node) -> list[Node] | None:
     return found
 
 
-@cache
-def _numerator(node: Node) -> list[Node] | None:
-    """Coefficients of ``a' b - a b'`` of a quotient of two polynomials a and b.
+def _quotient_rate(node: Node) -> Node | None:
+    """Derivative of a quotient of two polynomials a and b, ``(a' b - a b') / b^2``; None of anything else.
 
-    Multiplied out, as here, most terms cancel each other; computed from intervals of a and b they would not.
+    Multiplied out, as here, most terms of the dividend cancel each other; from intervals of a and b they would not.
     """
     a, b = (_polynomial(part) for part in node.parts)
     if a is None or b is None or len(a) == 1:
@@ -351,7 +258,25 @@ def _numerator(node: Node) -> list[Node] | None:
         for j in range(i):
             cross = plus(times(a[i], b[j]), negative(times(a[j], b[i])))
             found[i + j - 1] = plus(found[i + j - 1], times(number(i - j), cross))
-    return found
+    dividend = ZERO
+    for coefficient in reversed(found):
+        dividend = plus(times(dividend, SPEED), coefficient)
+    return divide(dividend, times(node.parts[1], node.parts[1]))
+
+
+@cache
+def _narrow(node: Node) -> Node | None:
+    """Derivative in a form with narrower bounds than those of the usual one, if there is one."""
+    if node.kind == "divide":
+        return _quotient_rate(node)
+    inner = node.parts[0]
+    factors = {
+        "exp": lambda: function("growth", inner),
+        "growth": lambda: node,
+        "tanh": lambda: function("decay", inner),
+        "decay": lambda: times(number(-2.0), times(function("tanh", inner), node)),
+    }
+    return times(factors[node.kind](), derivative(inner, _narrow)) if node.kind in factors else None
 
 
 class Enclosure:
@@ -372,52 +297,22 @@ class Enclosure:
         values: Mapping[str, NDArray[np.float64]],
         thresholds: Sequence[NDArray[np.float64]] = (),
     ) -> None:
-        """Find the constant nodes once, and the quotients of polynomials: their slopes have bounds of their own."""
-        self.output, self.thresholds = output, thresholds
+        """Bounds on constants and derivatives are found once they are needed."""
+        self.output, self.values, self.thresholds = output, values, thresholds
         self.rows = len(next(iter(values.values()))) if values else 1
-        found: dict[Node, Interval] = {}
-        nodes = nodes_of(output)
-        self.numerators = {
-            node: coefficients
-            for node in nodes
-            if node.kind == "divide" and node.varies and (coefficients := _numerator(node)) is not None
-        }
-        nodes = nodes_of(output, *chain.from_iterable(self.numerators.values()))
-        with np.errstate(all="ignore"):
-            for node in nodes:
-                if not node.varies:
-                    found[node] = self._constant(node, found, values)
-        self.nodes = [node for node in nodes if node.varies]
-        needed = {part for node in self.nodes for part in node.parts if not part.varies} | {output}
-        needed.update(chain.from_iterable(self.numerators.values()))
-        self.constants = {node: found[node] for node in needed if not node.varies}
-
-    @staticmethod
-    def _constant(node: Node, found: Mapping[Node, Interval], values: Mapping[str, NDArray[np.float64]]) -> Interval:
-        """Interval of a node that does not depend on the speed."""
-        if node.kind == "number":
-            return exact(node.value)
-        if node.kind == "symbol":
-            return exact(values[node.value])
-        parts = [found[part] for part in node.parts]
-        if node.kind in ("minimum", "maximum"):
-            return _extreme(np.minimum if node.kind == "minimum" else np.maximum, *parts)
-        series = _series_of(node, [[part] for part in parts], 0)[0]
-        assert series is not None
-        return series
+        self._constants: dict[Node, Interval] = {}
+        self._rates = [output]
 
     def size(self, row: NDArray[np.intp], speed: NDArray[np.float64], side: Any) -> NDArray[np.float64]:
         """Magnitude of the terms of a sum at a speed for each row, or else of the expression."""
-        found = self._found(row, speed, speed, side, 0)
         terms = self.output.parts if self.output.kind == "add" else (self.output,)
-        values = [found[term][0] or exact(0.0) for term in terms]
-        sizes = [np.maximum(abs(value.low), abs(value.high)) for value in values]
-        return np.broadcast_to(np.maximum.reduce(np.broadcast_arrays(*sizes)), len(row))
+        values = self._found(row, speed, speed, side, terms)
+        return np.maximum.reduce([np.maximum(abs(value.low), abs(value.high)) for value in values])
 
     def __call__(
         self, row: NDArray[np.intp], low: NDArray[np.float64], high: NDArray[np.float64], side: Any, order: int
-    ) -> Series:
-        """Power series of the expression on intervals of the speed.
+    ) -> list[Interval]:
+        """Bounds on the expression and on its derivatives on intervals of the speed.
 
         Parameters
         ----------
@@ -428,44 +323,52 @@ class Enclosure:
         side : ndarray of shape ``(cells,)``
             A speed, m/s: switches whose threshold is greater are on their lower side.
         order : int
-            Highest power.
+            Order of the last derivative.
         """
-        found = self._found(row, low, high, side, order)[self.output]
-        return [None if c is None else _for_each_cell(c, len(row)) for c in found]
+        while len(self._rates) <= order:
+            self._rates.append(derivative(self._rates[-1], _narrow))
+        return self._found(row, low, high, side, self._rates[: order + 1])
 
-    def _found(self, row: Any, low: Any, high: Any, side: Any, order: int) -> dict[Node, Series]:
-        """Power series of all nodes, with `order` + 1 coefficients; the arguments are those of a call."""
-        found: dict[Node, Series] = {}
-        empty: list[Interval | None] = [None] * order
+    def _found(self, row: Any, low: Any, high: Any, side: Any, outputs: Sequence[Node]) -> list[Interval]:
+        """Intervals of some nodes; the other arguments are those of a call."""
+        found: dict[Node, Interval] = {}
         with np.errstate(all="ignore"):
-            for node, constant in self.constants.items():
-                found[node] = [_taken(constant, row), *empty]
-            for node in self.nodes:
-                if node.kind == "variable":
-                    found[node] = [Interval(low, high), *[exact(1.0), *empty][:order]]
-                    continue
-                parts = [found[part] for part in node.parts]
-                if node.kind == "switch":
-                    below = side < self.thresholds[node.value][row]
-                    found[node] = [_chosen(below, *pair) for pair in zip(*parts, strict=True)]
+            for node in _order(tuple(outputs)):
+                parts = [found[part] for part in node.parts if part in found]
+                if not node.varies:
+                    found[node] = _taken(self._constant(node), row)
+                elif node.kind == "variable":
+                    found[node] = Interval(low, high)
+                elif node.kind == "switch":
+                    found[node] = _chosen(side < self.thresholds[node.value][row], *parts)
                 else:
-                    found[node] = _series_of(node, parts, order)
-                if order and node in self.numerators:
-                    coefficients = [found[c][0] for c in self.numerators[node]]
-                    rate = _horner(coefficients, Interval(low, high), order - 1)
-                    slope = _quotient_series(rate, _product_series(parts[1], parts[1])[:order])
-                    found[node] = [found[node][0], *(_over(c, k + 1) for k, c in enumerate(slope))]
-        return found
+                    found[node] = _value(node, parts)
+        return [Interval(*(None if x is None else np.broadcast_to(x, len(row)) for x in found[o])) for o in outputs]
+
+    def _constant(self, node: Node) -> Interval:
+        """Interval of a node that does not vary, for all sets of parameters."""
+        if node not in self._constants:
+            given = (
+                node.value if node.kind == "number" else self.values.get(node.value) if node.kind == "symbol" else None
+            )
+            parts = [self._constant(part) for part in node.parts]
+            self._constants[node] = _value(node, parts) if given is None else exact(given)
+        return self._constants[node]
 
 
-def _horner(coefficients: list[Interval | None], speed: Interval, order: int) -> Series:
-    """Power series of a polynomial of the speed, of order `order`, by Horner's rule; None is a coefficient 0."""
-    x = ([speed, exact(1.0)] + [None] * order)[: order + 1]
-    found: Series = [None] * (order + 1)
-    for coefficient in reversed(coefficients):
-        found = _product_series(found, x)
-        found[0] = _sum([found[0], coefficient])
-    return found
+@cache
+def _order(outputs: tuple[Node, ...]) -> list[Node]:
+    """Nodes in the order in which they are computed; of those that do not vary, only what others need."""
+    nodes = nodes_of(*outputs)
+    needed = {part for node in nodes if node.varies for part in node.parts}.union(outputs)
+    return [node for node in nodes if node.varies or node in needed]
+
+
+def _value(node: Node, parts: list[Interval]) -> Interval:
+    """Interval of a node from those of its parts."""
+    if node.kind == "multiply" and node.parts[0] is node.parts[1]:
+        return square(parts[0])
+    return _VALUES[node.kind](*parts)
 
 
 def _taken(a: Interval, row: NDArray[np.intp]) -> Interval:
@@ -477,18 +380,9 @@ def _taken(a: Interval, row: NDArray[np.intp]) -> Interval:
     return Interval(low, high, None if a.partial is None else np.broadcast_to(a.partial, a.low.shape)[row])
 
 
-def _chosen(below: Any, a: Interval | None, b: Interval | None) -> Interval | None:
-    """Interval `a` where `below` is true, else `b`; None stands for zero."""
-    if a is None and b is None:
-        return None
-    a, b = (exact(0.0) if x is None else x for x in (a, b))
+def _chosen(below: Any, a: Interval, b: Interval) -> Interval:
+    """Interval `a` where `below` is true, else `b`."""
     partial = None
     if a.partial is not None or b.partial is not None:
         partial = np.where(below, *(False if x.partial is None else x.partial for x in (a, b)))
     return Interval(np.where(below, a.low, b.low), np.where(below, a.high, b.high), partial)
-
-
-def _for_each_cell(a: Interval, cells: int) -> Interval:
-    """Interval with bounds for each of so many cells."""
-    partial = None if a.partial is None else np.broadcast_to(a.partial, cells)
-    return Interval(np.broadcast_to(a.low, cells), np.broadcast_to(a.high, cells), partial)

@@ -139,15 +139,8 @@ def _joined(parts: list[Cells]) -> Cells:
 
 
 def _at(enclosure: Enclosure, cells: Cells, speed: NDArray[np.float64], k: int) -> Interval:
-    """Coefficient `k` of the series of a function at one speed of each cell, m/s, on the side of the cell."""
-    found = enclosure(cells.row, speed, speed, cells.low, k)[k]
-    return _filled(found, len(speed))
-
-
-def _filled(found: Interval | None, cells: int) -> Interval:
-    """Interval of shape ``(cells,)``; None stands for zero."""
-    zero = np.zeros(cells)
-    return Interval(zero, zero) if found is None else found
+    """Derivative `k` of a function at one speed of each cell, m/s, on the side of the cell."""
+    return enclosure(cells.row, speed, speed, cells.low, k)[k]
 
 
 def _whole(found: Interval) -> NDArray[np.bool_]:
@@ -181,20 +174,20 @@ class _Bounds(NamedTuple):
 
 
 def _ends(enclosure: Enclosure, cells: Cells, k: int) -> list[Interval]:
-    """Coefficient `k` at both ends of each interval."""
+    """Derivative `k` at both ends of each interval."""
     both = _joined([cells, cells])
     found = _at(enclosure, both, np.concatenate([cells.low, cells.high]), k)
     return [Interval(found.low[half], found.high[half]) for half in np.split(np.arange(len(both.row)), 2)]
 
 
 def _bounds(enclosure: Enclosure, cells: Cells, k: int) -> _Bounds:
-    """Bounds on coefficient `k`."""
+    """Bounds on derivative `k`."""
     found = []
     for begin in range(0, max(len(cells.row), 1), _BLOCK):
         part = cells.where(slice(begin, begin + _BLOCK))
-        count, middle = len(part.row), part.middle()
-        series = enclosure(part.row, part.low, part.high, part.low, k + 1)
-        natural, rate = _filled(series[k], count), multiply(_filled(series[k + 1], count), exact(k + 1.0))
+        middle = part.middle()
+        bounds = enclosure(part.row, part.low, part.high, part.low, k + 1)
+        natural, rate = bounds[k:]
         point = _at(enclosure, part, middle, k)
         least, most = point.high.copy(), point.low.copy()
         with np.errstate(all="ignore"):
@@ -207,7 +200,7 @@ def _bounds(enclosure: Enclosure, cells: Cells, k: int) -> _Bounds:
                 high[monotone] = np.fmin(high[monotone], np.maximum(*(end.high for end in ends)))
                 least[monotone] = np.fmin(least[monotone], np.minimum(*(end.high for end in ends)))
                 most[monotone] = np.fmax(most[monotone], np.maximum(*(end.low for end in ends)))
-        nowhere = np.isnan(natural.low) | np.isnan(_filled(series[0], count).low)
+        nowhere = np.isnan(natural.low) | np.isnan(bounds[0].low)
         low[nowhere] = high[nowhere] = least[nowhere] = most[nowhere] = np.nan
         found.append((low, high, least, most, monotone & (rate.high <= VANISHING)))
     return _Bounds(*(np.concatenate(fields) for fields in zip(*found, strict=True)))
@@ -287,7 +280,7 @@ def _signs(enclosure: Enclosure, cells: Cells, least: float | None) -> NDArray[n
     """Sign of a function in each interval, or how it passes zero there, or that this is open."""
     count, shift = len(cells.row), exact(-(least or 0.0))
     with np.errstate(all="ignore"):
-        value, slope = (_filled(c, count) for c in enclosure(cells.row, cells.low, cells.high, cells.low, 1))
+        value, slope = enclosure(cells.row, cells.low, cells.high, cells.low, 1)
         value = add(value, shift) if least else value
         whole = _whole(value)
         code = np.full(count, _OPEN, dtype=np.int8)
@@ -434,7 +427,7 @@ def not_negligible(
 
     def decide(some: Cells, narrow: NDArray[np.bool_]) -> NDArray[np.int8]:
         low, high, *_ = _bounds(enclosure, some, 0)
-        rate = _filled(enclosure(some.row, some.low, some.high, some.low, 1)[1], len(low))
+        _, rate = enclosure(some.row, some.low, some.high, some.low, 1)
         least = np.where((rate.low <= 0.0) & (rate.high >= 0.0), 0.0, np.minimum(abs(rate.low), abs(rate.high)))
         with np.errstate(invalid="ignore"):
             small = factor * low > reach(factor * np.nan_to_num(least, nan=0.0), speed[some.row])
