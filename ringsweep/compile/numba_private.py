@@ -12,6 +12,7 @@ import hashlib
 import logging
 import operator
 import pickle
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from copy import copy
@@ -44,6 +45,10 @@ logger = logging.getLogger("ringsweep")
 # ---- LLVM: each function is linked and optimised once, as a part of its kernel ---------------
 
 
+# Linkage of functions that several modules may define, of Numba's own and of callees: LLVM keeps unused ones of these.
+_SHARED = llvm.Linkage.linkonce_odr, llvm.Linkage.weak_odr
+
+
 class _CalleeLibrary(JITCodeLibrary):
     """Code of a function that kernels call: its text, until a kernel is made."""
 
@@ -70,7 +75,7 @@ class _CalleeLibrary(JITCodeLibrary):
         found = llvm.parse_assembly(self._text)
         for function in found.functions:
             if function.linkage == llvm.Linkage.external and not function.is_declaration:
-                function.linkage = llvm.Linkage.linkonce_odr
+                function.linkage = llvm.Linkage.weak_odr
         return found
 
     def _get_module_for_linking(self) -> Any:
@@ -96,7 +101,7 @@ class _KernelLibrary(JITCodeLibrary):
         # LLVM inlines a function of any size at its only call, and drops arguments without use, if it knows that
         # there are no calls from elsewhere.
         for function in module.functions:
-            if function.linkage == llvm.Linkage.linkonce_odr and function.name not in own:
+            if function.linkage in _SHARED and function.name not in own:
                 function.linkage = llvm.Linkage.internal
         super().finalize()
 
@@ -110,17 +115,25 @@ class _KernelLibrary(JITCodeLibrary):
 def _link_all(module: Any, libraries: list[Any]) -> None:
     """Link libraries, and all libraries that they call, into a module: each of them once."""
     done: set[Any] = set()
-    waiting = list(libraries)
+    waiting, small, others = list(libraries), deque[Any](), []
     while waiting:
         library = waiting.pop()
         if library in done:
             continue
         done.add(library)
         if isinstance(library, _CalleeLibrary):
-            module.link_in(library.module())
+            small.append(library.module())
             waiting.extend(library._linking_libraries)
         else:
-            module.link_in(library._get_module_for_linking(), preserve=True)
+            others.append(library)
+    # The time to link two modules grows with the sizes of both: two at a time, as in a tournament.
+    while len(small) > 1:
+        small.append(small.popleft())
+        small[-1].link_in(small.popleft())
+    for whole in small:
+        module.link_in(whole)
+    for library in others:
+        module.link_in(library._get_module_for_linking(), preserve=True)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -159,6 +172,9 @@ class _CalleeLowering(NativeLowering):
 
 # ---- lowering ---------------------------------------------------------------------------------
 
+# By LLVM type: size, bytes.
+_sizes: dict[Any, int] = {}
+
 
 class _ReferenceCounts(NRTContext):
     """Numba's reference counts, without code that takes apart tuples of numbers in search of arrays."""
@@ -190,6 +206,12 @@ class _ArrayReleases(IRLegalization):
 
 class _Target(CPUContext):
     """Numba's target with :class:`_ReferenceCounts`."""
+
+    def get_abi_sizeof(self, ty: Any) -> int:
+        """Size of an LLVM type, bytes: LLVM tells it of a text that it has to read."""
+        if ty not in _sizes:
+            _sizes[ty] = super().get_abi_sizeof(ty)
+        return _sizes[ty]
 
     @cached_property
     def nrt(self) -> Any:

@@ -5,8 +5,8 @@ interval does not know that it stands in two places; narrow intervals of the spe
 R. B. Kearfott, M. J. Cloud, Introduction to Interval Analysis (SIAM, 2009).
 
 Bounds on a derivative are those of its expression, in a form in which as little as possible cancels. `partial` marks
-intervals on a part of which the function is not defined. :mod:`isolation` calls :class:`Enclosure`; nothing here runs in
-kernels.
+intervals on a part of which the function is not defined. :mod:`isolation` calls :class:`Enclosure`; nothing here runs
+in kernels.
 """
 
 from __future__ import annotations
