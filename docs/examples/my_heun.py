@@ -10,7 +10,7 @@ from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
 from ringsweep.physics import drives
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.solvers import Method, Needs, Result, add_method
+from ringsweep.solvers import Method, Result, add_method
 
 
 @inlined
@@ -60,7 +60,7 @@ class Heun(Method):
     steps: Annotated[int, Parameter("1", "steps over the span of time", lower=1, upper=1e8)]
 
     def needs(self, structure):
-        return Needs((), drives.CONSTANT_STEP_MEMBERS, recorder.MEMBERS + constant_step.MEMBERS)
+        return recorder.MEMBERS + constant_step.MEMBERS
 
     def run(self, batch, outcomes):
         cells = len(batch.span)

@@ -4,10 +4,10 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from ringsweep.solvers.event import Auto, Event, Implicit
-from ringsweep.solvers.method import Method, Needs, Result
+from ringsweep.solvers.method import Method, Result
 from ringsweep.solvers.rk4 import RK4
 
-__all__ = ["METHODS", "Method", "Needs", "Result", "add_method"]
+__all__ = ["METHODS", "Method", "Result", "add_method"]
 
 METHODS: dict[str, type[Method]] = {}
 

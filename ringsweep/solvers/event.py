@@ -19,14 +19,13 @@ from ringsweep.models.interface import audit, implicit, modes, recorder, series
 from ringsweep.models.scene import Structure
 from ringsweep.models.sliding import REACTION_TOLERANCE
 from ringsweep.numerics.series import ORDER
-from ringsweep.physics import drives
-from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
+from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of
 from ringsweep.physics.friction.velocity import varies
 from ringsweep.quantities.flags import CERTIFIED, FAILED, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.solvers.automaton import PATIENCE, History, LocalErrors, Results, integrate
 from ringsweep.solvers.certificate import TwoRuns, apart, diverging, judged, took_same_steps, with_errors
-from ringsweep.solvers.method import Method, Needs, Result
+from ringsweep.solvers.method import Method, Result
 from ringsweep.solvers.steps import FACTOR
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
@@ -74,15 +73,13 @@ class _Piecewise(Method):
     max_steps: int = _MOST_STEPS
     certify: bool = True
 
-    def needs(self, structure: Structure) -> Needs:
+    def needs(self, structure: Structure) -> tuple[Any, ...]:
         """Functions for modes and audit, and for series, implicit steps or both, as the law's family needs."""
         family = family_of(structure.law_type)
-        of_model = recorder.MEMBERS + recorder.EVENT_MEMBERS + modes.MEMBERS + audit.MEMBERS
-        of_model += () if family is Dynamic else series.MEMBERS
-        of_model += () if family is SetValued else implicit.MEMBERS
-        of_model += (implicit.is_stiff,) if family is Smooth else ()
-        of_law = presliding.MEMBERS if family is Dynamic else ()
-        return Needs(of_law, drives.MEMBERS, of_model)
+        found = recorder.MEMBERS + recorder.EVENT_MEMBERS + modes.MEMBERS + audit.MEMBERS
+        found += () if family is Dynamic else series.MEMBERS
+        found += () if family is SetValued else implicit.MEMBERS
+        return (*found, implicit.is_stiff) if family is Smooth else found
 
     def check(self, structure: Structure) -> None:
         """Refuse friction laws of other families.
@@ -298,7 +295,7 @@ class Auto(Method):
         """Times and rows of the history of cell 0; see :meth:`ringsweep.solvers.method.Method.history`."""
         return self._method(type(batch.law)).history(batch, samples, width)
 
-    def needs(self, structure: Structure) -> Needs:
+    def needs(self, structure: Structure) -> tuple[Any, ...]:
         """Functions that the method for the friction law needs."""
         return self.resolved(structure).needs(structure)
 

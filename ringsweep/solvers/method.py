@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,14 +48,6 @@ class Result:
     errors: NDArray[np.float64] | None = None
 
 
-class Needs(NamedTuple):
-    """Functions that a method needs of a friction law, of a drive, and of a model's type of scene."""
-
-    law: tuple[Any, ...]
-    drive: tuple[Any, ...]
-    model: tuple[Any, ...]
-
-
 class Method(ABC):
     """A method of integration. The fields of a derived dataclass are its options in a configuration."""
 
@@ -64,8 +56,8 @@ class Method(ABC):
     """Number of cells that it runs at once; fewer cells take as long."""
 
     @abstractmethod
-    def needs(self, structure: Structure) -> Needs:
-        """Functions that the method needs of the law, the drive and the model of a scene of this structure."""
+    def needs(self, structure: Structure) -> tuple[Any, ...]:
+        """Functions that the method needs of the model of a scene of this structure; laws and drives have all."""
 
     def check(self, structure: Structure) -> None:
         """Make sure that the method can run scenes of this structure.
@@ -73,8 +65,8 @@ class Method(ABC):
         Raises
         ------
         InputError
-            If the method does not take the law; if law, drive or model lack a function that it needs; or if the file of
-            one of them is not known to the cache of compiled code.
+            If the method does not take the law; if the model lacks a function that it needs; or if the file of law,
+            drive, model or method is not known to the cache of compiled code.
         """
         if structure.impact and family_of(structure.law_type) is Dynamic:
             raise InputError(
@@ -95,13 +87,12 @@ class Method(ABC):
                 "cannot stand beside scene.impact: the number of state variables changes from mode to mode; leave one "
                 "of them out",
             )
-        needs, model = self.needs(structure), model_of(structure)
-        law, drive = structure.law_type, structure.drive_type
-        for path, kind, name, source, cls, members in (
-            ("scene.friction.law", "friction law", structure.law, law, law, needs.law),
-            ("scene.drive.law", "drive", structure.drive, drive, drive, needs.drive),
-            ("scene.model", "model", structure.model, type(model), model.scene_type(structure), needs.model),
-            ("solver.method", "method", self.name, type(self), type(self), ()),
+        model = model_of(structure)
+        for path, kind, name, source in (
+            ("scene.friction.law", "friction law", structure.law, structure.law_type),
+            ("scene.drive.law", "drive", structure.drive, structure.drive_type),
+            ("scene.model", "model", structure.model, type(model)),
+            ("solver.method", "method", self.name, type(self)),
         ):
             if not has_known_source(source):
                 raise InputError(
@@ -109,8 +100,9 @@ class Method(ABC):
                     f"{kind} {name} comes from the module {source.__module__}, "
                     "whose file RINGSWEEP_LAWS does not name: edits of it would go unnoticed",
                 )
-            if missing := lacking(cls, members):
-                raise InputError(path, f"{kind} {name} has no {', '.join(missing)}, which solver {self.name} needs")
+        if missing := lacking(model.scene_type(structure), self.needs(structure)):
+            problem = f"model {structure.model} has no {', '.join(missing)}, which solver {self.name} needs"
+            raise InputError("scene.model", problem)
 
     def resolved(self, structure: Structure) -> Method:
         """The method that runs scenes of this structure: another one if this method chooses among methods."""

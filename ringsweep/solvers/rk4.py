@@ -26,13 +26,12 @@ from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, side_by_side, size_of, write
 from ringsweep.numerics.rows import distinct_rows
-from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, without_shape
-from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
+from ringsweep.physics.friction import TRAITS
 from ringsweep.quantities.flags import CERTIFIED, COARSE, FAILED, NO_RESULT, NOT_ASKED, SEPARATING
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.solvers.certificate import TwoRuns, apart, judged, with_errors
-from ringsweep.solvers.method import Method, Needs, Result
+from ringsweep.solvers.method import Method, Result
 
 #: Radius of the largest half disc in the left half plane in which the method is stable (more exactly 2.616). On the
 #: real axis the method is stable up to 2.785.
@@ -72,12 +71,9 @@ class RK4(Method):
     diagnose: bool = True
     """Whether to record the stiffness of each run; without it no run is certified."""
 
-    def needs(self, structure: Structure) -> Needs:
+    def needs(self, structure: Structure) -> tuple[Any, ...]:
         """Functions for steps of constant length, in vector lanes."""
-        of_law: tuple[Any, ...] = ()
-        if family_of(structure.law_type) is Dynamic:
-            of_law = (presliding.bristle, presliding.region_guard)
-        return Needs(of_law, drives.CONSTANT_STEP_MEMBERS, recorder.MEMBERS + constant_step.MEMBERS)
+        return recorder.MEMBERS + constant_step.MEMBERS
 
     def check(self, structure: Structure) -> None:
         """Refuse laws whose bonds snap, since a constant step does not locate the instants.
