@@ -34,7 +34,6 @@ def hook(stub: Callable[..., Any] | None = None, *, absorb: bool = False, option
     -------
     callable
         The hook. ``hook.implements(*types)`` decorates a body; ``hook.body_of(type)`` is the body for a type, or None.
-        ``hook.implemented_by(type, derive)`` gives a type whose body `derive` adds once it is needed.
 
     Raises
     ------
@@ -44,7 +43,6 @@ def hook(stub: Callable[..., Any] | None = None, *, absorb: bool = False, option
     if stub is None:
         return partial(hook, absorb=absorb, optional=optional)
     bodies: dict[type, Callable[..., Any]] = {}
-    derivations: dict[type, Callable[[], Any]] = {}
     default = stub if optional else None
     name, names = stub.__name__, list(inspect.signature(stub).parameters)
 
@@ -70,16 +68,9 @@ def hook(stub: Callable[..., Any] | None = None, *, absorb: bool = False, option
 
         return register
 
-    def implemented_by(cls: type, derive: Callable[[], Any]) -> None:
-        derivations[cls] = derive
-        bodies.pop(cls, None)
-
     def body_of(cls: type) -> Callable[..., Any] | None:
-        if cls in derivations and cls not in bodies:
-            derivations[cls]()
         return bodies.get(cls, default)
 
-    function.implemented_by = implemented_by  # type: ignore[attr-defined]
     function.implements = implements  # type: ignore[attr-defined]
     function.body_of = body_of  # type: ignore[attr-defined]
     return function

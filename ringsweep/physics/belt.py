@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from ringsweep.physics.bodies import LINE
-from ringsweep.physics.ring import body, having, radius
+from ringsweep.physics.ring import body
 from ringsweep.quantities.parameters import Leaf
 
 #: Symbols of the parts that a body may lack. The force is the sum of the external and of the viscous force.
@@ -57,12 +57,6 @@ class OnBelt(NamedTuple):
     damping: Leaf
     normal_stiffness: Leaf
     constants: tuple[Leaf, ...] = ()
-
-
-@radius.implements(*having(OnBelt, "mass"))
-def _radius_on_belt(body):
-    """Implement :func:`radius`: sliding velocity and velocity are in the same unit, m/s."""
-    return 1.0
 
 
 class Excited(NamedTuple):

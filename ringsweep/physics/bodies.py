@@ -90,6 +90,8 @@ class Equations:
     energy : str
         Kinetic and potential energy, J.
     coordinate : Coordinate
+    offset : str
+        Field with half the angle between the contacts; empty for an angle of 0.
     absent : collection of str
         Symbols that are 0 in balances and energy: fields of parts that the body lacks.
 
@@ -105,10 +107,11 @@ class Equations:
         balances: Sequence[str],
         energy: str,
         coordinate: Coordinate = ANGLE,
+        offset: str = "",
         absent: Collection[str] = (),
     ):
         """Read the balances, and refuse what is not linear, not known, or has a name twice."""
-        self.texts, self.contacts = tuple(balances), len(balances) - 1
+        self.texts, self.contacts, self.offset = tuple(balances), len(balances) - 1, offset
         if self.contacts not in (1, 2):
             problem = "give two for one contact, or three for two contacts; is a comma missing?"
             raise ValueError(f"{len(balances)} in number: {problem}")
@@ -214,6 +217,8 @@ class Equations:
         jams, of_reactions = whole != ONE, self._free_determinant(self.balances[:-1], self.unknowns[1:])
         values: dict[str, Any] = {
             "contact_count": lambda: [str(self.contacts)],
+            "contact_offset": lambda: [f"body.{self.offset}" if self.offset else "0.0"],
+            "radius": lambda: [source.value(Polynomial() + self.coordinate.lever)],
             "acceleration": lambda: [source.quotient(moment, whole), self._positive(source.value(whole))],
             "reactions": lambda: [source.quotient(p, whole) for p in (normals[0], normals[-1])],
             "acceleration_slope": lambda: [self._slope(moment, whole, {})],

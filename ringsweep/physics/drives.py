@@ -307,9 +307,11 @@ def _next_knot_of_table(drive, t):
     return drive.knots[j + 1] if j + 2 < len(drive.knots) else inf
 
 
-@hook(optional=True)
 def angle_at_start(drive):
     """Angle of the ring at t = 0, rad; outside kernels, for arrays of shape ``(cells,)``."""
+    if (function := FORMULAS.get(type(drive))) is not None:
+        knots = list(getattr(drive, "knots", np.empty((0, 0))).T)
+        return evaluate(function.value, 0.0, drive._asdict(), knots)
     return np.array([turn(take(drive, i), 0.0)[0] for i in range(len(drive[0]))])
 
 
@@ -450,12 +452,6 @@ def beginning(drive):
     return 0.0
 
 
-@angle_at_start.implements(Power)
-def _angle_at_start_of_power(drive):
-    """Implement :func:`angle_at_start`."""
-    return 0.0
-
-
 @beginning.implements(Power)
 def _beginning_of_power(drive):
     """Implement :func:`beginning`: its velocity or acceleration may be infinite at t = 0."""
@@ -490,10 +486,10 @@ def period(drive):
     return inf
 
 
-@hook(optional=True)
 def force_period(drive):
     """Period of a force with the formula of a drive; see :func:`period`, which is that of its rate."""
-    return period(drive)
+    function = FORMULAS.get(type(drive))
+    return period(drive) if function is None else period_of(function.value, drive._asdict())
 
 
 # The time 0, of the kind that kernels have: so functions of it are compiled for one kind only.
@@ -546,10 +542,6 @@ def velocity_at_beginning(drive, velocity):
     return velocity - (turn(drive, clock.Instant(beginning(drive), 0.0))[1] - before)
 
 
-#: Functions without a default that methods with a constant step need of a drive, and those that the other methods need.
-CONSTANT_STEP_MEMBERS = (shape,)
-MEMBERS = (expand, jerk)
-
 #: Drives by the name that the configuration gives them.
 DRIVES: dict[str, type] = {}
 
@@ -569,7 +561,7 @@ def add_drive(name: str, drive: type) -> None:
     TypeError
         If a hook has no body for the drive, or if the name is taken.
     """
-    if missing := lacking(drive, (shape, *MEMBERS)):
+    if missing := lacking(drive, (shape, expand, jerk)):
         raise TypeError(f"drive {name} has no {', '.join(missing)}: every drive needs it, before add_drive is called")
     if DRIVES.setdefault(name, drive) is not drive:
         raise TypeError(f"there is a drive {name} already: choose another name")
@@ -645,18 +637,9 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
         implement(next_knot, "drive, t", [*lines, "return found"])
     elif writer.is_polynomial(rate):
         turn_near.implements(drive)(_turn_near_of_table)
-    angle_at_start.implements(drive)(
-        lambda drive: evaluate(function.value, 0.0, drive._asdict(), list(getattr(drive, "knots", np.empty((0, 0))).T))
-    )
-    period.implements(drive)(_period_by_formula(function.rate))
-    force_period.implements(drive)(_period_by_formula(function.value))
+    period.implements(drive)(lambda drive: period_of(function.rate, drive._asdict()))
     found: type = drive
     return found
-
-
-def _period_by_formula(node: Node) -> Any:
-    """Body of :func:`period` for a drive whose shape is the expression `node`."""
-    return lambda drive: period_of(node, drive._asdict())
 
 
 # ---- the drives of the package ----------------------------------------------------------------
@@ -699,12 +682,6 @@ Sinusoidal = _drive(
 )
 
 add_drive("table", Table)
-
-
-@lookup.implements(Still)
-def _lookup_at_rest(drive, table, k):
-    """Implement :func:`lookup`: no angle, no velocity."""
-    return 0.0, 0.0
 
 
 # ---- drives of users --------------------------------------------------------------------------

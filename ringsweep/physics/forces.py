@@ -142,19 +142,7 @@ def _table_row_of_forced(drive, t):
 def _lookup_of_forced(drive, table, k):
     """Implement :func:`drives.lookup`, and the force, N."""
     theta, omega = drives.lookup(drive.motion, table, k)
-    return theta, omega, _varying(drive.force, table, k) + drive.constant
-
-
-@hook(absorb=True, optional=True)
-def _varying(force, table, k):
-    """Part of the force that varies, N, from the third column of a table of shapes."""
-    return drives.amplitude(force) * table[k, 2]
-
-
-@_varying.implements(drives.Still)
-def _not_varying(force, table, k):
-    """Implement :func:`_varying`: a constant force alone."""
-    return 0.0
+    return theta, omega, drives.amplitude(drive.force) * table[k, 2] + drive.constant
 
 
 @drives.expand.implements(Forced)

@@ -114,22 +114,7 @@ def angular_velocity(body, v, ring_omega):
     return 0.0 if abs(omega) < _ROUNDING * (abs(relative) + abs(ring_omega)) else omega
 
 
-@hook(optional=True)
-def contact_offset(body):
-    """Half the angle between the contacts, rad. Contact 1 is at ``phi - offset``, contact 2 at ``phi + offset``.
-
-    By default 0, for bodies with one contact.
-    """
-    return 0.0
-
-
-@hook(optional=True)
-def radius(body):
-    """Velocity of the body at its contacts per unit of the rate of its coordinate: the radius of the race, m."""
-    return body.radius
-
-
-#: Functions of a body that follow from its balances. `Equations` writes them.
+#: Functions of a body that follow from its declaration. `Equations` writes them.
 DERIVED: list[Any] = []
 
 
@@ -139,6 +124,16 @@ def _derived(stub: Any = None, *, absorb: bool = False) -> Any:
         return partial(_derived, absorb=absorb)
     DERIVED.append(hook(stub, absorb=absorb))
     return DERIVED[-1]
+
+
+@_derived
+def contact_offset(body):
+    """Half the angle between the contacts, rad. Contact 1 is at ``phi - offset``, contact 2 at ``phi + offset``."""
+
+
+@_derived
+def radius(body):
+    """Velocity of the body at its contacts per unit of the rate of its coordinate: the radius of the race, m."""
 
 
 @_derived
@@ -423,19 +418,15 @@ def body(
             raise TypeError(f"{cls.__name__}: offset names the field {offset}, which does not exist")
         try:
             # A mistake is told where it is made.
-            whole = Equations(cls._fields, balances, energy, coordinate)
+            whole = Equations(cls._fields, balances, energy, coordinate, offset)
         except ValueError as error:
             raise TypeError(f"{cls.__name__}: {error}") from None
         for count in range(len(optional) + 1):
             for absent in combinations(optional, count):
                 variant = _VARIANTS[cls, frozenset(absent)] = _without(cls, absent)
-                make = partial(Equations, variant._fields, balances, energy, coordinate, absent)
+                make = partial(Equations, variant._fields, balances, energy, coordinate, offset, absent)
                 _EQUATIONS[variant] = cache(make) if absent else lambda: whole
                 _complete.pop(variant, None)
-                for function in DERIVED:
-                    function.implemented_by(variant, partial(_derive, variant))
-                if offset:
-                    contact_offset.implements(variant)(function_from_lines("body", [f"return body.{offset}"], {}))
         return cls
 
     return declare
