@@ -203,32 +203,12 @@ def _polynomial(length, c, x):
     return [f"p = c[{length - 1}]", *(f"p = c[{k}] + x * p" for k in reversed(range(length - 1))), "return p"]
 
 
-# Near-minimax polynomial for (e^r - 1)/r where |r| is at most ln(2)/16, or ln(2)/2 without a table.
-_GROWTH = (
-    (
-        1.0,
-        0.500000000000018,
-        0.16666666666666868,
-        0.041666666589919826,
-        0.00833333332480596,
-        0.0013889705110294549,
-        0.00019842176749636047,
-    )
-    if _PARTS == 8
-    else (
-        1.0,
-        0.5000000000000006,
-        0.1666666666666667,
-        0.04166666666657239,
-        0.008333333333326084,
-        0.0013888888932751,
-        0.0001984126987500228,
-        2.4801504014426906e-05,
-        2.755725517000089e-06,
-        2.7626495546432196e-07,
-        2.5105312729622103e-08,
-    )
-)
+# Near-minimax polynomial for (e^r - 1)/r where |r| is at most ln(2)/16, or ln(2)/2 without a table: its power series as
+# a sum of Chebyshev polynomials, without those that are rounding.
+_WITHIN, _TERMS = _LN2 / (2.0 * _PARTS), 7 if _PARTS == 8 else 11
+_SERIES = np.polynomial.Polynomial([1.0 / math.factorial(k) for k in range(1, 25)])
+_CHEBYSHEV = _SERIES.convert(kind=np.polynomial.Chebyshev, domain=[-_WITHIN, _WITHIN]).truncate(_TERMS)
+_GROWTH = tuple(_CHEBYSHEV.convert(kind=np.polynomial.Polynomial).coef.tolist())
 
 
 def decay(x):
