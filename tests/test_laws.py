@@ -17,7 +17,6 @@ from solutions import made
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.numerics.series import ORDER
-from ringsweep.numerics.terms import COLUMNS, FACTOR_ROWS, MOST_GROUPS, inner_products, no_factors, set_factors
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of
 from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.physics.friction.velocity import (
@@ -185,14 +184,11 @@ def slope(law, speed):
 def series_of_friction(law, region, surfaces, x):
     """Series of the friction coefficient at each contact, from the series of the speed."""
     mu_0, begun, _ = begin_series(law, region, x[0], surfaces)
-    table = np.zeros((MOST_GROUPS * FACTOR_ROWS, COLUMNS))
-    first = newest = no_factors(no_products(law, surfaces))
-    found = [mu_0]
+    products = len(no_products(law, surfaces))
+    lefts, rights, found = np.zeros((len(x), products)), np.zeros((len(x), products)), [mu_0]
     for k in range(1, len(x)):
-        inner = inner_products(table, 0, k, first, newest)
-        mu_k, left, right = series_term(law, region, k, x[k], inner, begun, surfaces)
-        newest = set_factors(table, 0, k, left, right)
-        first = newest if k == 1 else first
+        inner = (lefts[1:k] * rights[k - 1 : 0 : -1]).sum(axis=0)
+        mu_k, lefts[k], rights[k] = series_term(law, region, k, x[k], inner, begun, surfaces)
         found.append(mu_k)
     return np.array(found).T
 

@@ -219,11 +219,10 @@ class TestSums:
 def test_products_that_grow_side_by_side_agree_with_numpy():
     left, right = np.random.default_rng(16).normal(size=(2, PRODUCTS, ORDER + 1))
     expected = np.array([np.convolve(a, b)[1 : ORDER + 1] for a, b in zip(left, right, strict=True)])
-    for products in (products_in_kernel, products_in_kernel.py_func):
-        # Numbers of an earlier step must not count.
-        c = np.full((PRODUCTS + FACTOR_ROWS, COLUMNS), np.nan)
-        products(c, left, right)
-        np.testing.assert_allclose(c[:PRODUCTS, 1 : ORDER + 1], expected, atol=1e-13)
+    # Numbers of an earlier step must not count.
+    c = np.full((PRODUCTS + FACTOR_ROWS, COLUMNS), np.nan)
+    products_in_kernel(c, left, right)
+    np.testing.assert_allclose(c[:PRODUCTS, 1 : ORDER + 1], expected, atol=1e-13)
 
 
 def test_kernels_and_python_find_the_same_first_roots():
@@ -241,13 +240,12 @@ def test_kernels_and_python_find_the_same_first_roots():
     assert 20 < (found == 1.0).sum() < 180
 
 
-@pytest.mark.parametrize("fill", [swing_in_kernel, swing_in_kernel.py_func], ids=["kernel", "python"])
-def test_series_of_a_swing_obey_its_equation_and_a_pendulum_keeps_energy(fill):
+def test_series_of_a_swing_obey_its_equation_and_a_pendulum_keeps_energy():
     factors = np.array([0.3, -1.1, 0.4, 0.2, 0.1])
     for pendulum in (False, True):
         rows = np.zeros((4, COLUMNS))
         rows[:3, 0] = 0.7, np.sin(0.5), np.cos(0.5)
-        fill(rows, np.array([0.0, -1.0, 0.0, 0.0, 0.0]) if pendulum else factors)
+        swing_in_kernel(rows, np.array([0.0, -1.0, 0.0, 0.0, 0.0]) if pendulum else factors)
         omega, sine, cosine, square = rows[:, : ORDER + 1]
         np.testing.assert_allclose(np.convolve(omega, omega)[: ORDER + 1], square, atol=1e-14)
         np.testing.assert_allclose(np.convolve(omega, cosine)[:ORDER], K[1:] * sine[1:], atol=1e-14)

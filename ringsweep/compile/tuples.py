@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection
-from functools import cache
+from functools import cache, partial
 from math import inf, nan
 from typing import Any
 
@@ -56,7 +56,7 @@ def unrolled(write: Callable[..., Any]) -> Any:
     return found
 
 
-def generated(write: Callable[..., Any]) -> Any:
+def generated(write: Callable[..., Any] | None = None, *, absorb: bool = False) -> Any:
     """Make a function for kernels whose body is generated for the types of its arguments.
 
     Parameters
@@ -64,7 +64,11 @@ def generated(write: Callable[..., Any]) -> Any:
     write : callable
         Takes the Numba types of the arguments, under the names of the arguments. Returns either the lines of the body
         and a dictionary of the names that they use, or a function with the same arguments.
+    absorb : bool
+        Whether bodies of any size are inlined; see :func:`ringsweep.compile.absorbed`.
     """
+    if write is None:
+        return partial(generated, absorb=absorb)
     names = list(inspect.signature(write).parameters)
 
     def refuse(*arguments: Any) -> Any:
@@ -75,7 +79,7 @@ def generated(write: Callable[..., Any]) -> Any:
         return function_from_lines(", ".join(names), *made) if isinstance(made, tuple) else made
 
     found = stub(write, names, refuse)
-    specialise(found, body)
+    specialise(found, body, absorb=absorb)
     return found
 
 

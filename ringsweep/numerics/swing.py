@@ -14,32 +14,10 @@ from typing import Any
 import llvmlite.ir as ir
 from numba.core import types
 
-from ringsweep.compile import specialise
 from ringsweep.numerics.lanes import intrinsic, spread_scalar
 from ringsweep.numerics.terms import ORDER
 
 _DOUBLE, _PAIR = ir.DoubleType(), ir.VectorType(ir.DoubleType(), 2)
-
-
-def swing(omega, sine, cosine, square, factors):
-    """Fill coefficients 1 ... ORDER of the rate of an angle, of its sine and cosine, and of the square of the rate.
-
-    Parameters
-    ----------
-    omega, sine, cosine, square : ndarray
-        Series, of which coefficients 0 are given; that of the angle is not needed.
-    factors : tuple of float
-        A constant, and the factors of sine, cosine, rate and square, whose sum is the second derivative of the angle.
-    """
-    constant, by_sine, by_cosine, by_omega, by_square = factors
-    for k in range(ORDER + 1):
-        square[k] = sum(omega[j] * omega[k - j] for j in range(k + 1))
-        if k < ORDER:
-            by_motion = by_sine * sine[k] + by_cosine * cosine[k] + by_omega * omega[k] + by_square * square[k]
-            sine_rate = sum(omega[j] * cosine[k - j] for j in range(k + 1))
-            cosine_rate = -sum(omega[j] * sine[k - j] for j in range(k + 1))
-            omega[k + 1] = ((constant if k == 0 else 0.0) + by_motion) / (k + 1)
-            sine[k + 1], cosine[k + 1] = sine_rate / (k + 1), cosine_rate / (k + 1)
 
 
 class _Code:
@@ -67,8 +45,16 @@ class _Code:
 
 
 @intrinsic
-def _swing_in_kernel(typingctx, omega, sine, cosine, square, factors):
-    """Form of :func:`swing` for kernels, in two lanes: cosine and sine side by side."""
+def swing(typingctx, omega, sine, cosine, square, factors):
+    """Fill coefficients 1 ... ORDER of the rate of an angle, of its sine and cosine, and of the square of the rate.
+
+    Parameters
+    ----------
+    omega, sine, cosine, square : ndarray
+        Series, of which coefficients 0 are given; that of the angle is not needed.
+    factors : tuple of float
+        A constant, and the factors of sine, cosine, rate and square, whose sum is the second derivative of the angle.
+    """
 
     def lower(context, builder, sig, args):
         code = _Code(builder)
@@ -121,10 +107,3 @@ def _swing_in_kernel(typingctx, omega, sine, cosine, square, factors):
         return context.get_dummy_value()
 
     return types.none(omega, sine, cosine, square, factors), lower
-
-
-specialise(
-    swing,
-    lambda *kinds: lambda omega, sine, cosine, square, factors: _swing_in_kernel(omega, sine, cosine, square, factors),
-    absorb=True,
-)

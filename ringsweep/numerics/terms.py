@@ -17,7 +17,7 @@ import llvmlite.ir as ir
 import numpy as np
 from numba.core import cgutils, types
 
-from ringsweep.compile import absorbed, function_from_lines, specialise
+from ringsweep.compile import absorbed, function_from_lines, generated, specialise
 from ringsweep.numerics.lanes import Lanes, intrinsic, loader, spread_scalar, storer
 
 #: Highest power of every series.
@@ -170,13 +170,7 @@ _in_kernels(sign_changes, lambda values: _sign_changes_in_kernel(values))
 
 # ---- products of several series ---------------------------------------------------------------
 
-# Products grow side by side in groups of PRODUCTS. The factors of a group are a pair, left ones and right ones: in
-# Python arrays, in kernels vectors.
-
-
-def no_factors(like):
-    """Factors before the first ones, for as many products as the tuple `like` is long, see :func:`set_factors`."""
-    return tuple((np.zeros(PRODUCTS), np.zeros(PRODUCTS)) for _ in range(_groups_for(len(like))))
+# Products grow side by side in groups of PRODUCTS. The factors of a group are a pair, left ones and right ones.
 
 
 def _groups_for(products: int) -> int:
@@ -191,15 +185,13 @@ def _zero_factors(typingctx):
     return _FACTORS(), lambda context, builder, sig, args: zeros
 
 
-def _no_factors_in_kernel(like: Any) -> Any:
-    """Body of :func:`no_factors` for the type of its argument."""
-    text = "(zeros(), zeros()), " * _groups_for(len(like))
-    return function_from_lines("like", [f"return ({text})"], {"zeros": _zero_factors})
+@generated(absorb=True)
+def no_factors(like):
+    """Factors before the first ones, for as many products as the tuple `like` is long, see :func:`set_factors`."""
+    return [f"return ({'(zeros(), zeros()), ' * _groups_for(len(like))})"], {"zeros": _zero_factors}
 
 
-specialise(no_factors, _no_factors_in_kernel, absorb=True)
-
-
+@generated(absorb=True)
 def set_factors(c, row, k, left, right):
     """Store coefficient `k` of pairs of factors.
 
@@ -218,19 +210,16 @@ def set_factors(c, row, k, left, right):
     tuple
         The same numbers side by side, for :func:`inner_products`.
     """
-    found = []
-    for group in range(_groups_for(len(left))):
-        pair = np.zeros((2, PRODUCTS))
-        part = slice(group * PRODUCTS, (group + 1) * PRODUCTS)
-        pair[0, : len(left[part])], pair[1, : len(right[part])] = left[part], right[part]
-        _pairs(c, row + group * FACTOR_ROWS, k + 1)[k] = pair
-        found.append((pair[0], pair[1]))
-    return tuple(found)
 
+    def part(name: str, group: int) -> str:
+        places = range(group * PRODUCTS, (group + 1) * PRODUCTS)
+        return "(" + "".join(f"{name}[{i}], " if i < len(left) else "0.0, " for i in places) + ")"
 
-def _pairs(c: Any, row: int, count: int) -> Any:
-    """The first factors of a group, of shape ``(count, 2, PRODUCTS)``; a view."""
-    return c.reshape(-1)[row * c.shape[1] :][: count * 2 * PRODUCTS].reshape(count, 2, PRODUCTS)
+    calls = (
+        f"set_group(c, row + {group * FACTOR_ROWS}, k, {part('left', group)}, {part('right', group)}), "
+        for group in range(_groups_for(len(left)))
+    )
+    return [f"return ({''.join(calls)})"], {"set_group": _set_group}
 
 
 @intrinsic
@@ -257,23 +246,7 @@ def _set_group(c, row, k, left, right):
     return a, b
 
 
-def _set_factors_in_kernel(c: Any, row: Any, k: Any, left: Any, right: Any) -> Any:
-    """Body of :func:`set_factors` for the types of its arguments."""
-
-    def part(name: str, group: int) -> str:
-        places = range(group * PRODUCTS, (group + 1) * PRODUCTS)
-        return "(" + "".join(f"{name}[{i}], " if i < len(left) else "0.0, " for i in places) + ")"
-
-    calls = (
-        f"set_group(c, row + {group * FACTOR_ROWS}, k, {part('left', group)}, {part('right', group)}), "
-        for group in range(_groups_for(len(left)))
-    )
-    return function_from_lines("c, row, k, left, right", [f"return ({''.join(calls)})"], {"set_group": _set_group})
-
-
-specialise(set_factors, _set_factors_in_kernel, absorb=True)
-
-
+@generated(absorb=True)
 def inner_products(c, row, k, first, newest):
     """Coefficient `k` of products of two series, without the terms that contain a coefficient 0 or `k`.
 
@@ -294,11 +267,11 @@ def inner_products(c, row, k, first, newest):
         For each pair of factors a and b the sum of ``a[j] b[k - j]`` over j = 1 ... k - 1. The length is a multiple of
         PRODUCTS.
     """
-    found: tuple[float, ...] = ()
+    lines, numbers = [], []
     for group in range(len(first)):
-        pairs = _pairs(c, row + group * FACTOR_ROWS, k)
-        found += tuple((pairs[1:, 0] * pairs[:0:-1, 1]).sum(axis=0)) if k > 1 else (0.0,) * PRODUCTS
-    return found
+        lines.append(f"g{group} = of_group(c, row + {group * FACTOR_ROWS}, k, first[{group}], newest[{group}])")
+        numbers += [f"g{group}[{i}], " for i in range(PRODUCTS)]
+    return [*lines, f"return ({''.join(numbers)})"], {"of_group": _inner_products_of_group}
 
 
 @intrinsic
@@ -332,19 +305,6 @@ def _inner_products_of_group(c, row, k, first, newest):
     if k > 2:
         odd = odd + newest[0] * first[1]
     return _unpacked(even + first[0] * newest[1] + odd)
-
-
-def _inner_products_in_kernel(c: Any, row: Any, k: Any, first: Any, newest: Any) -> Any:
-    """Body of :func:`inner_products` for the types of its arguments."""
-    lines, numbers = [], []
-    for group in range(len(first)):
-        lines.append(f"g{group} = of_group(c, row + {group * FACTOR_ROWS}, k, first[{group}], newest[{group}])")
-        numbers += [f"g{group}[{i}], " for i in range(PRODUCTS)]
-    scope = {"of_group": _inner_products_of_group}
-    return function_from_lines("c, row, k, first, newest", [*lines, f"return ({''.join(numbers)})"], scope)
-
-
-specialise(inner_products, _inner_products_in_kernel, absorb=True)
 
 
 def joined(a, b):
