@@ -35,7 +35,7 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from ringsweep.compile import hook, inlined
-from ringsweep.physics import ring
+from ringsweep.physics import pivot, ring
 
 #: Modes of the contacts. CLOSED: slip goes on with both closed. OPEN_1, OPEN_2, OPEN_BOTH: these contacts open. STICK,
 #: FORWARD, BACKWARD: motion from rest with both closed. IMPOSSIBLE: no unique motion of rigid bodies.
@@ -223,36 +223,25 @@ def _carries_alone(body, side, k, m, slides, motion, epsilon):
     `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are friction and static friction at this contact, and
     the rest is as for :func:`opening`.
     """
-    b, (sin_phi, cos_phi, omega) = body, motion
-    sb, cb = b.sin_beta, b.cos_beta
+    b, (sin_phi, cos_phi, omega), (sb, cb) = body, motion, (side * body.sin_beta, body.cos_beta)
     # The moment of inertia may be zero; a lower bound avoids the division by zero.
-    per_inertia = b.mass / max(b.inertia, 1e-9 * b.mass * b.radius * b.radius)
-    lever = b.radius - b.xi * cb
-    # Accelerations times the mass: of the gap (`gap`), of the place along the race (`slide`), and of the gap of the
-    # other contact (`other`). Without suffix: without this contact's forces; _n, _f: per unit of its reaction and of
-    # its friction. `cross` is both gap_f and slide_n.
-    gap_n, slide_f = 1.0 + b.xi * b.xi * sb * sb * per_inertia, 1.0 + lever * lever * per_inertia
-    cross = side * b.xi * lever * sb * per_inertia
-    other_n = cb * cb - sb * sb * (1.0 + b.xi * b.xi * per_inertia)
-    other_f = side * sb * (2.0 * cb - b.xi * lever * per_inertia)
-    across, along = b.mass * (b.gravity * cos_phi + b.xi * omega * omega), b.mass * b.gravity * sin_phi
-    gap, other = side * sb * along - cb * across, -side * sb * along - cb * across
-    slide = -side * sb * across - cb * along - b.mass * b.radius * epsilon
-    least = -_ROUNDING * (abs(across) + abs(along) + b.mass * b.radius * abs(epsilon))
-    if slides != 0:
-        stiffness = gap_n + k * cross
-        load = -gap / stiffness
-        return stiffness > 0.0 and load > 0.0 and other + (other_n + k * other_f) * load > least
-    determinant = gap_n * slide_f - cross * cross
-    load, pull = (cross * slide - slide_f * gap) / determinant, (cross * gap - gap_n * slide) / determinant
-    if load > 0.0 and abs(pull) <= m * load and other + other_n * load + other_f * pull > least:
-        return True
+    inertia, square = max(b.inertia, 1e-9 * b.mass * b.radius * b.radius), omega * omega
+    # At this instant the contact moves along the race as a ball without a radius does.
+    angle = 0.0, sin_phi * cb + cos_phi * sb, cos_phi * cb - sin_phi * sb
+    place = *angle, b.xi * cb - b.radius, -b.xi * sb
+    f = pivot.Frame(b.mass, inertia, b.gravity, 0.0, b.radius, *place, omega, omega, square, square)
+    arm, carried = -2.0 * b.radius * sb * cb, b.radius * epsilon
+    least = -_ROUNDING * (abs(b.gravity * cos_phi + b.xi * square) + abs(b.gravity * sin_phi) + abs(carried))
+    if slides == 0:
+        psi_dd, alpha_dd, load, pull = pivot.in_stick(f, carried)
+        if load > 0.0 and abs(pull) <= m * load and arm * (psi_dd - alpha_dd) > least:
+            return True
     for sign in (-1.0, 1.0):
-        stiffness = gap_n - sign * k * cross
-        load = -gap / stiffness
-        starts = sign * (slide + (cross - sign * k * slide_f) * load) > 0.0
-        opens = other + (other_n - sign * k * other_f) * load > least
-        if stiffness > 0.0 and load > 0.0 and starts and opens:
+        K = k if slides != 0 else -sign * k
+        found = pivot.in_slip(f, K)
+        starts = slides != 0 or sign * pivot.sliding_acceleration(f, found, carried) > 0.0
+        opens = arm * (found[0] - found[1]) > least
+        if pivot.determinant(f, K) > 0.0 and found[2] > 0.0 and starts and opens:
             return True
     return False
 
