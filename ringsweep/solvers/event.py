@@ -70,7 +70,7 @@ class _Piecewise(Method):
     families: ClassVar[tuple[type, ...]]
 
     rtol: float
-    max_steps: int = _MOST_STEPS
+    max_steps: Annotated[int, LIMIT] = _MOST_STEPS
     certify: bool = True
 
     def needs(self, structure: Structure) -> tuple[Any, ...]:
@@ -252,8 +252,6 @@ class Event(_Piecewise):
     families: ClassVar[tuple[type, ...]] = (SetValued,)
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-15, upper=1e-3)] = 1e-10
-    max_steps: Annotated[int, LIMIT] = _MOST_STEPS
-    certify: bool = True
 
     def tolerances(self) -> tuple[float, float]:
         """Relative error allowed to a step of the series, twice: there are no implicit steps."""
@@ -268,8 +266,6 @@ class Implicit(_Piecewise):
     families: ClassVar[tuple[type, ...]] = (Smooth, Dynamic)
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
-    max_steps: Annotated[int, LIMIT] = _MOST_STEPS
-    certify: bool = True
 
     def tolerances(self) -> tuple[float, float]:
         """Relative errors allowed to a step of the series and to an implicit step."""

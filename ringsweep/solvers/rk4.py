@@ -83,20 +83,17 @@ class RK4(Method):
         InputError
             If the method does not take the friction law; and as in :meth:`Method.check`.
         """
-        if TRAITS[structure.law_type].snaps:
-            raise InputError(
-                "solver.method", f"rk4 does not take friction law {structure.law}, whose bonds snap: auto takes it"
-            )
-        if structure.impact:
-            raise InputError(
-                "solver.method", "rk4 does not go on after a contact is lost: auto does; or leave scene.impact out"
-            )
-        if structure.exponent:
-            raise InputError(
-                "solver.method", "rk4 locates no events, at which disturbances jump: auto gives record.exponent"
-            )
-        if structure.section is not None:
-            raise InputError("solver.method", "rk4 locates no instants for record.section: auto does")
+        for refused, problem in (
+            (
+                TRAITS[structure.law_type].snaps,
+                f"does not take friction law {structure.law}: its bonds snap; auto takes it",
+            ),
+            (structure.impact, "does not go on after a contact is lost: auto does; or leave scene.impact out"),
+            (structure.exponent, "locates no events, at which disturbances jump: auto gives record.exponent"),
+            (structure.section, "locates no instants for record.section: auto does"),
+        ):
+            if refused:
+                raise InputError("solver.method", f"rk4 {problem}")
         super().check(structure)
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:

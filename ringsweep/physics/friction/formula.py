@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 import math
 import re
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -34,6 +35,9 @@ COEFFICIENTS = ("mu_s", "mu_k")
 
 # Longest text, in characters, and deepest nesting.
 _LONGEST, _DEEPEST = 2000, 60
+
+# Greatest number.
+_GREATEST = sys.float_info.max
 
 
 @dataclass(frozen=True)
@@ -229,7 +233,7 @@ class Reader:
         """Expression of a part of the formula, within some switches."""
         match tree:
             case ast.Constant(value=value):
-                if isinstance(value, bool) or not isinstance(value, int | float) or not _finite(value):
+                if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _GREATEST:
                     raise FormulaError(f"{_shown(tree)} is not a finite number")
                 return number(value)
             case ast.Name(id=name):
@@ -345,14 +349,6 @@ class Reader:
             remedy = "take letters, digits and _, and another name"
             raise FormulaError(f"{name} cannot be the name of a parameter: {remedy}")
         return symbol(name)
-
-
-def _finite(value: float) -> bool:
-    """Whether a number is finite as a double."""
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False
 
 
 # ---- units ------------------------------------------------------------------------------------
