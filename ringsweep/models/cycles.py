@@ -413,18 +413,14 @@ def returns_each_time(scene, c, forced, fast, largest_multiplier, growth):
     if to_come > _TREND or merging:
         return False
     # Beside a continuum of motions stops may shrink for ever, and the states no longer change.
-    share, stops = stops_of_laps(c)
+    # Those of the last third of the laps, or of up to two thirds.
+    older, newer = laps.older, laps.newer
+    first = newer.mark if laps.number >= 1.5 * newer.number > 0.0 else older.mark
+    t = c.reference.t - first.t
+    share, cycles = (c.reference.total - first.total) / t, floor(t * c.lap / c.period + 0.5)
+    stops = (c.reference.slips - first.slips) / cycles
     same = abs(stops - c.stops) < _SAME_STOPS and abs(share - c.share) <= RETURN * c.share + _SAME_STOPS
     return same or not forced
-
-
-@inlined
-def stops_of_laps(c):
-    """Share of stick and stops in a cycle of the last third of the laps, or of up to two thirds."""
-    older, newer = c.laps.older, c.laps.newer
-    first = newer.mark if c.laps.number >= 1.5 * newer.number > 0.0 else older.mark
-    t = c.reference.t - first.t
-    return (c.reference.total - first.total) / t, (c.reference.slips - first.slips) / floor(t * c.lap / c.period + 0.5)
 
 
 @inlined

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import inf, isfinite, isnan
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined, unrolled
+from ringsweep.compile import absorbed, feature, hook, inlined, unrolled
 from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import exceeds, larger_eigenvalue
@@ -250,18 +250,14 @@ def _sticks_on_bristles(scene, before, now):
     return before.stuck > 0.0
 
 
-@hook
+@feature("abs(now.v) < stiction_band(scene.law)")
+def _counts_as_stuck(stuck, scene, now):
+    """Whether the body counts as stuck: within the stiction band, or while the guard of the bristles is positive."""
+    return stuck > 0.0
+
+
+@inlined
 def word_of_mode(scene, now):
     """Number for the mode of an :class:`Inspection` in a history: 0 in stick, else the sign of the sliding velocity."""
-
-
-@word_of_mode.implements(Ring, Belt)
-def _word_of_mode_by_velocity(scene, now):
-    """Implement :func:`word_of_mode`: stick within the stiction band, else the sign of the sliding velocity."""
-    return 0.0 if abs(now.v) < stiction_band(scene.law) or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
-
-
-@word_of_mode.implements(BristleRing, BristleBelt)
-def _word_of_mode_by_bristles(scene, now):
-    """Implement :func:`word_of_mode`: stick is the guard of the bristles."""
-    return 0.0 if now.stuck > 0.0 else 1.0 if now.v > 0.0 else -1.0
+    sticks = _counts_as_stuck(now.stuck, scene, now) or now.v == 0.0
+    return 0.0 if sticks else 1.0 if now.v > 0.0 else -1.0

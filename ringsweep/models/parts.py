@@ -28,14 +28,6 @@ SPAN = Parameter("s", "span of time", lower=0.0, open_lower=True)
 
 
 @absorbed
-def largest_eigenvalue(trace, determinant):
-    """Largest magnitude of an eigenvalue of a 2 x 2 matrix with this trace and determinant."""
-    square = trace * trace - 4.0 * determinant
-    root = square_root(select(square > 0.0, square, determinant))
-    return select(square > 0.0, 0.5 * (abs(trace) + root), root)
-
-
-@absorbed
 def exceeds(most, trace, determinant):
     """Whether an eigenvalue of a 2 x 2 matrix with this trace and determinant exceeds `most` in magnitude.
 
@@ -52,7 +44,9 @@ def larger_eigenvalue(most, trace, determinant):
     """`most`, or the largest magnitude of an eigenvalue of a 2 x 2 matrix where that is larger."""
     more = exceeds(most, trace, determinant)
     if any_of(more):
-        most = select(more, max(most, largest_eigenvalue(trace, determinant)), most)
+        square = trace * trace - 4.0 * determinant
+        root = square_root(select(square > 0.0, square, determinant))
+        most = select(more, max(most, select(square > 0.0, 0.5 * (abs(trace) + root), root)), most)
     return most
 
 

@@ -77,8 +77,11 @@ def _place_from_space(scene, forcing, x):
 
 
 @inlined
-def expand_bounds(c, rows, mode, bounds):
+def expand_bounds(c, rows, mode, bounds, size):
     """Fill the guards of slip for both bounds of the region of the friction law, m/s.
+
+    The lower guard begins level if it begins at rest and its rate is but rounding: if friction does not drop at
+    breakaway the rate is zero there.
 
     Parameters
     ----------
@@ -89,21 +92,14 @@ def expand_bounds(c, rows, mode, bounds):
     mode : NamedTuple
     bounds : tuple of float
         The bounds, m/s.
+    size : float
+        Size of the terms of the sliding acceleration, m/s^2; 0 if the rate counts whatever it is.
     """
     (v, slow, fast), (low, high), sign = rows, bounds, float(mode.sign)
     set_terms(c[slow], terms(c[v]) * sign)
     set_terms(c[fast], terms(c[v]) * -sign)
     c[slow, 0] = 0.0 if mode.entry_guard == slow else sign * c[v, 0] - low
     c[fast, 0] = 0.0 if mode.entry_guard == fast else high - sign * c[v, 0]
-
-
-@inlined
-def level_at_breakaway(c, slow, mode, low, size):
-    """Let the guard of slip begin level, if it begins at zero and its rate is but rounding.
-
-    If friction does not drop at breakaway the rate is zero there. `size` is that of the terms of the sliding
-    acceleration, m/s^2.
-    """
     if mode.entry_guard == slow and low == 0.0 and abs(c[slow, 1]) <= 1e-12 * size:
         c[slow, 1] = 0.0
 
@@ -142,7 +138,7 @@ def imbalances(scene, friction, normals, motion, forcing, rate, scales):
     motion : tuple of float
         As for :func:`ringsweep.physics.ring.acceleration`.
     forcing : tuple of float
-        What :func:`ringsweep.models.interface.implicit.forcing` returned.
+        What :func:`ringsweep.physics.drives.turn` returned.
     rate : float
         Rate of the sliding velocity from the dense output, m/s^2.
     scales : tuple of float

@@ -58,8 +58,8 @@ def is_checked(n):
 @inlined
 def _ends(scene, step, scratch):
     """``((forcing, x), (forcing, x))`` at the beginning and at the end of an implicit step."""
-    before = implicit.forcing(scene, scratch.course, step.now, 0.0)
-    after = implicit.forcing(scene, scratch.course, step.now, step.s)
+    before = drives.turn_near(scene.drive, scratch.course, step.now, 0.0)
+    after = drives.turn_near(scene.drive, scratch.course, step.now, step.s)
     return (before, implicit.to_implicit(scene, before, step.y)), (
         after,
         implicit.to_implicit(scene, after, step.y_next),
@@ -77,27 +77,13 @@ def _violation_in_series(family, scene, step, scratch, tolerance, fraction):
 def _violation_in_implicit_step(family, scene, step, scratch, tolerance, fraction):
     """Violation and power at a fraction of an implicit step, from its dense output."""
     (_, x), (_, x_next) = _ends(scene, step, scratch)
-    forcing, bends = implicit.forcing(scene, scratch.course, step.now, fraction * step.s), scratch.bends[0]
+    forcing, bends = drives.turn_near(scene.drive, scratch.course, step.now, fraction * step.s), scratch.bends[0]
     state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends, fraction))
     rates = rosenbrock.dense_rates(x, x_next, bends, fraction, step.s)
     return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
 
 
-def _energies_in_series(family, scene, step, scratch):
-    """Energies at both ends of a step, J."""
-    after = drives.turn(scene.drive, later(step.now, step.s))
-    before = drives.turn(scene.drive, step.now)
-    return audit_of_model.energy_of(scene, before, step.y), audit_of_model.energy_of(scene, after, step.y_next)
-
-
-def _energies_in_implicit_step(family, scene, step, scratch):
-    """Energies at both ends of an implicit step, J."""
-    (before, _), (after, _) = _ends(scene, step, scratch)
-    return audit_of_model.energy_of(scene, before, step.y), audit_of_model.energy_of(scene, after, step.y_next)
-
-
 _violation = either(_violation_in_series, _violation_in_implicit_step)
-_energies = either(_energies_in_series, _energies_in_implicit_step)
 
 
 @inlined
@@ -123,7 +109,8 @@ def audit_step(family, scene, step, scratch, tolerance, audit):
     """
     violation_1, power_1 = _violation(family, scene, step, scratch, tolerance, EARLY)
     violation_2, power_2 = _violation(family, scene, step, scratch, tolerance, LATE)
-    before, after = _energies(family, scene, step, scratch)
+    before = audit_of_model.energy_of(scene, drives.turn(scene.drive, step.now), step.y)
+    after = audit_of_model.energy_of(scene, drives.turn(scene.drive, later(step.now, step.s)), step.y_next)
     work, change = 0.5 * step.s * (power_1 + power_2), after - before
     moved = 0.5 * step.s * (abs(power_1) + abs(power_2)) + abs(change)
     violation = max(audit.violation, max(violation_1, violation_2))
@@ -142,7 +129,7 @@ def _fall_rate_in_series(family, scene, step, scratch, guard):
 def _fall_rate_in_implicit_step(family, scene, step, scratch, guard):
     """Mean rate at which a guard fell in the last tenth of an implicit step."""
     (before, x), (_, x_next) = _ends(scene, step, scratch)
-    late = implicit.forcing(scene, scratch.course, step.now, 0.9 * step.s)
+    late = drives.turn_near(scene.drive, scratch.course, step.now, 0.9 * step.s)
     state = rosenbrock.dense(x, x_next, scratch.bends[0], 0.9)
     view = implicit.guards_and_motion(scene, step.mode, implicit.common(scene, step.mode, before, x), late, state)
     return view[0][guard - scratch.first_guard] / (0.1 * step.s)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import inf, isfinite
 from typing import Any, NamedTuple
 
-from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, replacing, take
+from ringsweep.compile import Cells, borrowed, feature, hook, inlined, kernel, replacing, take
 from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, modes, recorder, series, simpler, variation
 from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, RUNNING
@@ -181,15 +181,9 @@ def _step_implicitly(family, scene, run, h_max, tolerances, scratch):
     return True, guard, s, y, record, control, _after_creep(run.local, error)
 
 
-@hook(absorb=True, optional=True)
-def _step_in(kind, scene, run, h_max, tolerances, scratch):
+@feature("_step_of_family(family(scene.law), scene, run, h_max, tolerances, scratch)", of=simpler.PARTED, absorb=True)
+def _step_in(scene, run, h_max, tolerances, scratch):
     """One step of a scene, or of the simpler scene whose mode it is in; see :func:`_step_of_family`."""
-    return _step_of_family(family(scene.law), scene, run, h_max, tolerances, scratch)
-
-
-@_step_in.implements(simpler.Parted)
-def _step_of_simpler_scene(kind, scene, run, h_max, tolerances, scratch):
-    """Implement :func:`_step_in`: the simpler scene takes the step in its modes."""
     if not simpler.is_simpler(scene, run.mode):
         return _step_of_family(family(scene.law), scene, run, h_max, tolerances, scratch)
     part, record, y = simpler.simplify(scene, run.record, run.mode, run.y)
@@ -399,9 +393,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             h_max = _until(limit, now)
             control = _with_length(control, min(control.h, spacing))
             run = Run(record, mode, now, y, control, local, just_switched)
-            is_implicit, guard, s, y_next, record, control, local = _step_in(
-                simpler.kind(scene), scene, run, h_max, tolerances, scratch
-            )
+            is_implicit, guard, s, y_next, record, control, local = _step_in(scene, run, h_max, tolerances, scratch)
             step = Step(mode, is_implicit, now, s, y, y_next)
             if len(history.times) > 0:
                 if count == len(history.times):

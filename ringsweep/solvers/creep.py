@@ -68,23 +68,18 @@ class Taken(NamedTuple):
 @inlined
 def start_at(scene, course, mode, now, y):
     """Beginning of an implicit step in the state `y` of a mode at an instant."""
-    forcing = implicit.forcing(scene, course, now, 0.0)
+    forcing = drives.turn_near(scene.drive, course, now, 0.0)
     x = implicit.to_implicit(scene, forcing, y)
     common = implicit.common(scene, mode, forcing, x)
     return Start(mode, now, y, x, forcing, common, implicit.linearise(scene, mode, common, now, forcing, x))
 
 
 @inlined
-def _view_at(scene, start, course, s, x):
-    """View of a state the time `s` after the beginning of a step."""
-    return implicit.guards_and_motion(scene, start.mode, start.common, implicit.forcing(scene, course, start.now, s), x)
-
-
-@inlined
 def _view_within(scene, start, scratch, taken, fraction):
     """View of the dense output at a fraction of a step."""
     x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
-    return _view_at(scene, start, scratch.course, fraction * taken.h, x)
+    forcing = drives.turn_near(scene.drive, scratch.course, start.now, fraction * taken.h)
+    return implicit.guards_and_motion(scene, start.mode, start.common, forcing, x)
 
 
 @inlined
@@ -93,10 +88,10 @@ def _step_of_method(scene, start, course, h, end, bends):
     now = start.now
     first, second, third, fourth, _ = rosenbrock.STAGE_TIMES
     forcings = (
-        implicit.forcing(scene, course, now, first * h),
-        implicit.forcing(scene, course, now, second * h),
-        implicit.forcing(scene, course, now, third * h),
-        implicit.forcing(scene, course, now, fourth * h),
+        drives.turn_near(scene.drive, course, now, first * h),
+        drives.turn_near(scene.drive, course, now, second * h),
+        drives.turn_near(scene.drive, course, now, third * h),
+        drives.turn_near(scene.drive, course, now, fourth * h),
         end,
     )
     return rosenbrock.step(start.x, scene, start, h, forcings, bends)
@@ -105,7 +100,7 @@ def _step_of_method(scene, start, course, h, end, bends):
 @inlined
 def _guard_after(scene, start, scratch, h, g):
     """Value of guard `g` after a step of the method of length `h`, s."""
-    end = implicit.forcing(scene, scratch.course, start.now, h)
+    end = drives.turn_near(scene.drive, scratch.course, start.now, h)
     x_next, _ = _step_of_method(scene, start, scratch.course, h, end, scratch.bends[1])
     return implicit.guards_and_motion(scene, start.mode, start.common, end, x_next)[0][g]
 
@@ -331,7 +326,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     event, h, near = -1, s, False
     before = implicit.guards_and_motion(scene, mode, common, forcing, x)
     for _ in range(400):
-        end = implicit.forcing(scene, course, now, h)
+        end = drives.turn_near(scene.drive, course, now, h)
         x_next, error = _step_of_method(scene, start, course, h, end, bends)
         h_norm = _error_norm(error, scales, linear)
         if not h_norm <= 1.0:
@@ -382,7 +377,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             view = _view_within(scene, start, scratch, taken, fraction)
         if looks and fraction != 1.0 and _sets_record(scene, record, (before, view, after)):
             # A step of the method is more exact than the dense output, whose error may be that of the whole step.
-            there = implicit.forcing(scene, course, now, fraction * h)
+            there = drives.turn_near(scene.drive, course, now, fraction * h)
             state, _ = _step_of_method(scene, start, course, fraction * h, there, scratch.bends[1])
             view = implicit.guards_and_motion(scene, mode, common, there, state)
         duration = (fraction - fraction_before) * h

@@ -53,18 +53,6 @@ def _first_event_of_series(c, first, entry_guard, h, work):
 
 
 @inlined
-def _shared(run, s, h, reach):
-    """Error of a step for :class:`LocalErrors`: in units of the tolerance if a looser run takes the same step; else 0.
-
-    The length of the step is `s`, without an event `h`; the tolerance allows the length `reach`, s.
-    """
-    error = (s / reach) ** ORDER if s > 0.0 else 0.0
-    # The looser run needs no shorter step up to the event, or is limited to the same length. A mode that lasts for one
-    # step is one step of the looser run too.
-    return error if error * FACTOR < 1.0 or s == h < reach or (run.has_switched and s < h) else 0.0
-
-
-@inlined
 def _observe_series(scene, run, s, scratch):
     """Record after a step of length `s` of the series, with the extremes within the step."""
     c, instants = scratch.c, scratch.work[0]
@@ -111,4 +99,8 @@ def series_step(scene, run, h_max, tolerance, scratch):
     h = min(longest, h_max)
     guard, s = _first_event_of_series(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)
     record = _observe_series(scene, run, s, scratch) if s > 0.0 else run.record
-    return guard, s, series.state_at(scene, c, s), record, _shared(run, s, h, reach)
+    error = (s / reach) ** ORDER if s > 0.0 else 0.0
+    # The looser run needs no shorter step up to the event, or is limited to the same length. A mode that lasts for one
+    # step is one step of the looser run too.
+    same = error * FACTOR < 1.0 or s == h < reach or (run.has_switched and s < h)
+    return guard, s, series.state_at(scene, c, s), record, error if same else 0.0

@@ -10,6 +10,7 @@ from ringsweep.compile import feature
 from ringsweep.models.interface import implicit, series, variation
 from ringsweep.numerics.clock import later
 from ringsweep.numerics.collocation import FEW, MANY, WEIGHTS_OF_FEW, WEIGHTS_OF_MANY, largest_trace, store
+from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
 
 # Longest piece of a step of series, in times in which a disturbance grows by a factor of e: where friction falls
@@ -58,7 +59,7 @@ def along_implicit(asked, scene, record, start, taken, ends, scratch):
     for i in range(len(FEW)):
         fraction = low + (high - low) * FEW[i]
         t = later(start.now, fraction * taken.h)
-        forcing = implicit.forcing(scene, scratch.course, start.now, fraction * taken.h)
+        forcing = drives.turn_near(scene.drive, scratch.course, start.now, fraction * taken.h)
         x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
         store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
     # The last node is the end.

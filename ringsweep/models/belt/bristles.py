@@ -48,12 +48,6 @@ def recoil_speed(scene):
 
 
 @inlined
-def _play(scene):
-    """Distance that the body moves while its bristles go from one largest deflection to the other, m."""
-    return 2.0 * scene.mu_s / scene.law.sigma0
-
-
-@inlined
 def _deflection_at_start(scene):
     """Deflection of the bristles at t = 0, m. It also resets the memory that the law may have."""
     return initial_deflection(scene.law, scene.mu_s, scene.mu_k) + scene.initial_z
@@ -79,7 +73,9 @@ def _slip_on_bristle_belt(scene, y, v, forcing, angle):
 @recorder.begin.implements(BristleBelt)
 def _begin_record_on_bristle_belt(scene, t, seen):
     """Implement :func:`recorder.begin`, for the speed and the distance at which bristles yield."""
-    return record_at_launch(scene, t, seen, stick_speed(scene.law, recoil_speed(scene)), _play(scene))
+    # The body moves so far while its bristles go from one largest deflection to the other.
+    play = 2.0 * scene.mu_s / scene.law.sigma0
+    return record_at_launch(scene, t, seen, stick_speed(scene.law, recoil_speed(scene)), play)
 
 
 @recorder.keep_memory.implements(BristleBelt)

@@ -196,7 +196,7 @@ def record_at_launch(scene, t, seen, band, play):
     `band` and `play` are fields of :class:`Record`; `seen` is described at :func:`_observe_on_belt`.
     """
     x, velocity, force, place, v, v_rate, acceleration, _ = seen
-    start = Mark(t, x, velocity, 0.0, 0.0)
+    start, end = Mark(t, x, velocity, 0.0, 0.0), cycles.end_of(scene, scene.cycle, 1.0)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
     pull = max(abs(scene.body.mass * v_rate + force), abs(scene.body.stiffness * x))
@@ -211,18 +211,12 @@ def record_at_launch(scene, t, seen, band, play):
         velocity,
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
-        cycles.none_yet(scene.excited, _first_time(scene), start),
+        # The record waits for the end of a cycle, or for the middle of a span that is not as long.
+        cycles.none_yet(scene.excited, end if end <= scene.span else 0.5 * scene.span, start),
         shock.at_launch(acceleration),
         tangent.undisturbed(scene.asked, scene, t),
         (),
     )
-
-
-@inlined
-def _first_time(scene):
-    """Time that the record waits for first, s: the end of a cycle, or the middle of a span that is not as long."""
-    end = cycles.end_of(scene, scene.cycle, 1.0)
-    return end if end <= scene.span else 0.5 * scene.span
 
 
 @recorder.lend.implements(Belt, BristleBelt)
@@ -454,7 +448,10 @@ def _conclude_on_belt(scene, record, status, t, place, velocity):
 def _settles_to(scene, r, t):
     """Words for the motion and for what it settles to, period, share of stick and stops in a cycle, mean velocity."""
     c, forced, repeats = r.cycles, scene.cycle < inf, scene.forcing_period < inf
-    returns = (repeats or not forced) and _returns_each_time(scene, r)
+    fast, growth = c.swing * (2.0 * pi) / _pace(scene), tangent.exponent(r.tangent)
+    returns = (repeats or not forced) and cycles.returns_each_time(
+        scene, c, forced, fast, tangent.largest_multiplier(r.tangent), growth
+    )
     period, share, stops_per_cycle, swing = c.period if returns else nan, c.share, c.stops, c.swing
     drift = (r.last.x - c.half_x) / (t - c.half_t) if t > c.half_t else r.last.velocity
     if returns:
@@ -543,14 +540,6 @@ def _words(scene, r, t, of):
         lasts = (stays and returns) or long_run != PERIODIC
         return OSCILLATORY, long_run if lasts else TRANSIENT, period if stays else nan, 0.0, 0.0
     return SLIDING, still if c.swing <= RETURN * (r.x_max - r.x_min) else TRANSIENT, nan, 0.0, 0.0
-
-
-@inlined
-def _returns_each_time(scene, r):
-    """Whether the motion returns each time, and no trend of its states would change it in ten spans."""
-    fast = r.cycles.swing * (2.0 * pi) / _pace(scene)
-    largest, growth = tangent.largest_multiplier(r.tangent), tangent.exponent(r.tangent)
-    return cycles.returns_each_time(scene, r.cycles, scene.cycle < inf, fast, largest, growth)
 
 
 @feature("TRANSIENT")

@@ -203,8 +203,9 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
             c[ACCELERATION, k] = (k + 1.0) * (k + 2.0) * c[SHIFT, k + 2]
             if k > 0:
                 c[X, k] = c[SHIFT, k]
-            load, pull = _held_term(body, c, k, one, c[ACCELERATION, k])
-            bound = scene.mu_s * load
+            motion, cube = (c[X, k], c[PUSH, k], c[VELOCITY, k]), _cube_term(body, c, k)
+            c[NORMAL, k], _, friction = ring.held(body, one, motion, cube, c[ACCELERATION, k], 0.0)
+            pull, bound = -friction, scene.mu_s * c[NORMAL, k]
             if mode.sign == 0:
                 c[V, k], c[FORCE, k], c[SLOW, k], c[FAST, k] = y[1] * one, pull, bound - pull, bound + pull
             else:
@@ -220,7 +221,7 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
             c[FAST, 0] += least
     else:
         sharpness = _expand_slip(scene, mode, if_force(body, scene.viscous, 0.0), c)
-        expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region))
+        expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), 0.0)
         if _has_dead_band(scene) and mode.entry_guard == SLOW:
             # A body whose momentum is that of the edge leaves the band as the pull reaches the breakaway force.
             size = (abs(c[FORCE, 0]) + ring.size(body, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]))) / body.mass
@@ -260,14 +261,6 @@ def _from_no_load(c, sticks):
         if zeros < ORDER:
             for k in range(ORDER + 1):
                 c[row, k] = c[row, k + zeros] if k + zeros <= ORDER else 0.0
-
-
-@inlined
-def _held_term(body, c, k, one, acceleration):
-    """Coefficients `k` of the reaction and of the pull, N, of a stuck body; `one` is coefficient `k` of 1."""
-    motion = c[X, k], c[PUSH, k], c[VELOCITY, k]
-    c[NORMAL, k], _, friction = ring.held(body, one, motion, _cube_term(body, c, k), acceleration, 0.0)
-    return c[NORMAL, k], -friction
 
 
 @inlined

@@ -21,7 +21,7 @@ def violation(scene, mode, forcing, y, rates, s, tolerance):
     scene, mode : NamedTuple
         One cell, and its mode.
     forcing : tuple of float
-        What :func:`ringsweep.models.interface.implicit.forcing` returned for the time of the state.
+        What :func:`ringsweep.physics.drives.turn` returned for the time of the state.
     y, rates : tuple of float
         State of the mode within a step, and its time derivative, both from the solver's dense output.
     s : float
@@ -49,7 +49,7 @@ def energy_of(scene, forcing, y):
     scene : NamedTuple
         One cell.
     forcing : tuple of float
-        What :func:`ringsweep.models.interface.implicit.forcing` returned for the time of the state.
+        What :func:`ringsweep.physics.drives.turn` returned for the time of the state.
     y : tuple of float
         State of the mode.
 

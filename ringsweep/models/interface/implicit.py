@@ -13,8 +13,7 @@ method in ``rosenbrock.py``. Nothing may be remembered between calls, since step
 
 from __future__ import annotations
 
-from ringsweep.compile import absorbed, hook
-from ringsweep.physics import drives
+from ringsweep.compile import hook
 
 #: Tolerance of an implicit step, in units of the tolerance of the series.
 IMPLICIT_TOLERANCE = 1e3
@@ -37,29 +36,6 @@ def is_stiff(scene, mode, y, linear):
     -------
     bool
     """
-
-
-@absorbed
-def forcing(scene, course, now, s):
-    """Forcing the time `s` after another time.
-
-    Parameters
-    ----------
-    scene : NamedTuple
-        One cell.
-    course : ndarray
-        Series of the drive about a recent time, see :func:`ringsweep.physics.drives.follow`.
-    now : Instant
-        The other time, s.
-    s : float
-        Time since then, s.
-
-    Returns
-    -------
-    tuple of float
-        What :func:`ringsweep.physics.drives.turn` returns.
-    """
-    return drives.turn_near(scene.drive, course, now, s)
 
 
 @hook(optional=True)

@@ -5,23 +5,11 @@ Only the body with impact in the ring uses it, and only ``ringsweep/solvers/auto
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from ringsweep.compile import hook
+from ringsweep.physics.impact import ImpactRing
 
-
-class Whole(NamedTuple):
-    """Scenes all of whose modes are of one kind."""
-
-
-class Parted(NamedTuple):
-    """Scenes some of whose modes are those of a simpler scene, which takes the steps in these modes."""
-
-
-@hook(optional=True)
-def kind(scene):
-    """Kind of a scene: :class:`Whole` or :class:`Parted`; by default the first. The other hooks are for the second."""
-    return Whole()
+#: Types of these scenes.
+PARTED = (ImpactRing,)
 
 
 @hook

@@ -16,7 +16,7 @@ from math import cos, inf, sin
 import numpy as np
 
 from ringsweep.compile import inlined, take
-from ringsweep.models.interface import audit
+from ringsweep.models.interface import audit, implicit
 from ringsweep.models.ring.bristles import slip_of
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.series import NORMAL_1, NORMAL_2
@@ -87,10 +87,11 @@ def _violation_on_ring(scene, mode, forcing, y, rates, s, tolerance):
     return larger(largest, violation), power
 
 
-@audit.energy_of.implements(ring.Ring)
+@audit.energy_of.implements(ring.Ring, ring.BristleRing)
 def _energy_on_ring(scene, forcing, y):
-    """Implement :func:`audit.energy_of`."""
-    return ring.energy(scene.body, (sin(y[0]), cos(y[0]), y[1] / scene.body.radius + forcing[1]))
+    """Implement :func:`audit.energy_of`; with bristles the place in the state is the angle in the ring's frame."""
+    phi = implicit.to_implicit(scene, forcing, y)[0] + forcing[0]
+    return ring.energy(scene.body, (sin(phi), cos(phi), y[1] / scene.body.radius + forcing[1]))
 
 
 @audited.implements(ring.BristleRing)
@@ -102,13 +103,6 @@ def _audited_on_bristle_ring(scene, mode, forcing, y):
     now = slip_of(scene, under, (sin(phi), cos(phi), omega), y, sign, mode.region)
     terms = body.gravity + body.radius * (omega * omega + abs(forcing[2]))
     return now, terms, inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
-
-
-@audit.energy_of.implements(ring.BristleRing)
-def _energy_on_bristle_ring(scene, forcing, y):
-    """Implement :func:`audit.energy_of`; the place in the state is the angle in the ring's frame."""
-    phi = y[0] + forcing[0]
-    return ring.energy(scene.body, (sin(phi), cos(phi), y[1] / scene.body.radius + forcing[1]))
 
 
 # Largest rounding of an angle, rad.

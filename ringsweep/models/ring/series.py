@@ -19,7 +19,7 @@ from __future__ import annotations
 from math import cos, inf, isnan, sin
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, feature, hook, inlined, replacing, specialise
+from ringsweep.compile import absorbed, feature, generated, hook, inlined, replacing
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
@@ -33,7 +33,7 @@ from ringsweep.models.ring.contacts import (
     places_beyond,
     zones_of,
 )
-from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, level_at_breakaway, rate_at_rest, speed_in
+from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, rate_at_rest, speed_in
 from ringsweep.numerics.clock import Instant, parts
 from ringsweep.numerics.series import (
     INVERSE,
@@ -317,17 +317,6 @@ def _separated(body, normals, scale, first):
 
 
 @inlined
-def _after_zero_reaction(scene, mode, first, t, y):
-    """Status after the reaction of contact 1 (`first`) or of contact 2 has vanished, in slip or in stick."""
-    if mode.sign != 0:
-        return lost_in_slip(scene, mode, first, t, y)
-    # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band still
-    # hold the body at this instant.
-    normals, scale = _loads_as_stick_ends(scene, mode, t, y, first)
-    return _separated(scene.body, normals, scale, first)
-
-
-@inlined
 def _loads_as_stick_ends(scene, mode, t, y, first):
     """``((N1, N2), scale)`` where the reaction of contact 1 (`first`) or 2 has vanished in stick; N."""
     body = scene.body
@@ -358,7 +347,12 @@ def _switch_on_ring(scene, mode, guard, t, y):
     """
     phi, v = y
     if guard in (NORMAL_1, NORMAL_2):
-        return _after_zero_reaction(scene, mode, guard == NORMAL_1, t, y), mode, y
+        if mode.sign != 0:
+            return lost_in_slip(scene, mode, guard == NORMAL_1, t, y), mode, y
+        # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band
+        # still hold the body at this instant.
+        normals, scale = _loads_as_stick_ends(scene, mode, t, y, guard == NORMAL_1)
+        return _separated(scene.body, normals, scale, guard == NORMAL_1), mode, y
     if guard == DETERMINANT:
         return JAM, mode, y
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
@@ -427,9 +421,10 @@ def _fill_table_on_ring(scene, mode, t, y, tolerance, c):
     return shorten_for_decay(sharpness, c[V], h), h
 
 
+@generated
 def _expand_slip(law, scene, mode, c):
     """Fill the series of slip and return the sharpness of the friction law."""
-    return _slip_under(type(law))(law, scene, mode, c)
+    return _expand_slip_of_varying_friction if is_varying(law) else _expand_slip_of_constant_friction
 
 
 @inlined
@@ -505,14 +500,6 @@ def _expand_slip_of_constant_friction(law, scene, mode, c):
     return 0.0
 
 
-def _slip_under(law):
-    """Function that expands slip under a law: friction that varies with the speed needs series of its own."""
-    return _expand_slip_of_varying_friction if is_varying(law) else _expand_slip_of_constant_friction
-
-
-specialise(_expand_slip, lambda law, *others: _slip_under(law))
-
-
 @inlined
 def _constant_term(balance, sine, cosine, omega, square):
     """Coefficient 0 of an acceleration or a reaction, from its row in :func:`ring.slip_balance`."""
@@ -531,9 +518,7 @@ def _expand_slip_guards(scene, mode, c):
     """Fill the guards of slip for both ends of the region of the friction law, and for the nearer edge."""
     body = scene.body
     size = body.gravity + body.radius * (c[SQUARE, 0] + abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
-    bounds = region_bounds(scene.law, mode.region)
-    expand_bounds(c, (V, SLOW, FAST), mode, bounds)
-    level_at_breakaway(c, SLOW, mode, bounds[0], size)
+    expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), size)
     set_terms(c[EDGE], (terms(c[THETA]) - terms(c[PHI])) * float(mode.sign))
     c[EDGE, 0] = min(edges_ahead(scene, mode, c[PHI, 0] - c[THETA, 0]))
 

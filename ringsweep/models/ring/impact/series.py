@@ -53,7 +53,7 @@ from ringsweep.models.ring.series import (
     X,
     Y,
 )
-from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds, level_at_breakaway, rate_at_rest, speed_in
+from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds, rate_at_rest, speed_in
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
@@ -107,12 +107,6 @@ def _fill_table_with_impact(scene, mode, t, y, tolerance, c):
 # ---- both contacts hold: the closed ring takes the steps --------------------------------------
 
 _with_base = replacing("base")
-
-
-@simpler.kind.implements(ImpactRing)
-def _kind_with_impact(scene):
-    """Implement :func:`simpler.kind`: while both contacts hold, the closed ring takes the steps."""
-    return simpler.Parted()
 
 
 @simpler.is_simpler.implements(ImpactRing)
@@ -253,9 +247,7 @@ def _expand_pivot_guards(scene, mode, f, eta, fresh, c):
         return
     body = scene.closed.body
     size = pivot.size(f) + body.radius * (abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
-    bounds = region_bounds(scene.law, mode.region)
-    expand_bounds(c, (V, SLOW, FAST), mode, bounds)
-    level_at_breakaway(c, SLOW, mode, bounds[0], size)
+    expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), size)
 
 
 @inlined

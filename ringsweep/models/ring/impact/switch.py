@@ -246,8 +246,9 @@ def _takes_off(scene, mode, t, y, zeros):
     both = (zeros, contacts.zeros_2) if contact == 1 else (contacts.zeros_1, zeros)
     event = opens(contact, contacts.event.number, t)
     flight = in_flight((mode.place_1, mode.place_2), contacts.turned, _remaining(mode, y, both), event)
-    motion = motion_of(scene, y, drives.turn(scene.drive, t)[1])
-    return RUNNING, flight, state_in_flight(motion, contacts.turned, _gaps_in_pivot(scene, mode, y))
+    motion, gap = motion_of(scene, y, drives.turn(scene.drive, t)[1]), gap_measure(scene, mode, y[2])
+    gaps = (gap, 0.0) if contacts.open == FIRST else (0.0, gap)
+    return RUNNING, flight, state_in_flight(motion, contacts.turned, gaps)
 
 
 @inlined
@@ -262,13 +263,6 @@ def _jammed(scene, mode, v):
 
 
 @inlined
-def _gaps_in_pivot(scene, mode, y):
-    """Measures of both gaps in a pivot, m."""
-    gap = gap_measure(scene, mode, y[2])
-    return (gap, 0.0) if mode.contacts.open == FIRST else (0.0, gap)
-
-
-@inlined
 def _remaining(mode, y, zeros):
     """Leading zeros of both gaps after an event in a pivot: none for the gap that has grown since it opened."""
     if y[2] == 0.0:
@@ -280,8 +274,10 @@ def _remaining(mode, y, zeros):
 def _on_one_contact(scene, mode, guard, t, y):
     """Status, mode and state after a guard of slip or stick in a pivot: an edge, a bound, rest, or breakaway."""
     v, stick_end, (mu_s, _, _) = y[1], 0, coefficients_there(scene, place_of(mode))
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
     if guard == EDGE:
-        mode = with_place(mode, _beyond_nearer_edge(scene, mode, t, y))
+        above, below = distances_to_edges(scene, mode, frame(scene, y, ring_omega).alpha - theta)
+        mode = with_place(mode, cross_edge(scene.closed.surface, place_of(mode), 1 if above <= below else -1))
     mode = with_zeros(mode, _remaining(mode, y, (mode.contacts.zeros_1, mode.contacts.zeros_2)))
     if mode.sign == 0:
         stick_end = 0 if guard == EDGE else 1 if guard == SLOW else -1
@@ -290,18 +286,9 @@ def _on_one_contact(scene, mode, guard, t, y):
     if mode.sign == 0:
         return _begun(scene, t, (y[0], 0.0, *y[2:]), mode, stick_end)
     state = y[0], v, *y[2:]
-    _, ring_omega, _ = drives.turn(scene.drive, t)
     K, _ = pivot.friction(scene, mode, v)
     denominator = determinant(frame(scene, state, ring_omega), K)
     return (RUNNING if denominator > 0.0 else BROKEN if isnan(denominator) else JAM), mode, state
-
-
-@inlined
-def _beyond_nearer_edge(scene, mode, t, y):
-    """Place of the contact that holds in a pivot after it has crossed the nearer edge."""
-    theta, ring_omega, _ = drives.turn(scene.drive, t)
-    above, below = distances_to_edges(scene, mode, frame(scene, y, ring_omega).alpha - theta)
-    return cross_edge(scene.closed.surface, place_of(mode), 1 if above <= below else -1)
 
 
 @inlined
