@@ -128,6 +128,13 @@ class TestCreep:
         assert np.ptp(fractions) < 1e-3
         assert -0.9 < fractions[0] < -0.1
 
+    def test_slow_creep_takes_as_few_steps_in_a_wide_band(self, setting):
+        """The motion decides how long steps are, not the time in which friction relaxes."""
+        v0 = np.array([2e-6, 2e-4, 2e-3, 2e-2])
+        found = solve(Implicit(certify=False), setting(29, drive__amplitude=0.03, friction__v0=v0))
+        assert found.stick_time == pytest.approx(10.0)
+        assert found.steps.max() < 1.5 * found.steps.min()
+
     def test_body_at_rest_on_a_ring_at_rest_does_not_move(self, setting):
         found = solve(Implicit(max_steps=2000), setting(29, drive__amplitude=0.0))
         assert found.regime == RESTING

@@ -169,11 +169,12 @@ def _linearise_slip(scene, mode, common, t, forcing, x):
 def relaxes(scene, linear, frequency):
     """Whether slip relaxes fast compared with the motion of the body, whose frequency is given, rad/s.
 
-    And the transient must be over: transients into the stiction band, and out of it at its top, are as fast as the
-    decay itself.
+    An implicit step is as long as the motion allows, a step of a series about seven times as long as slip takes to
+    relax. And the transient must be over: transients into the stiction band, and out of it at its top, are as fast as
+    the decay itself.
     """
     acceleration, decay = linear[0][1], -linear[1][1][1]
-    return decay > 50.0 * frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
+    return decay > 10.0 * frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
 
 
 @region_guards.implements(Ring, Belt)

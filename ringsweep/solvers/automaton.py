@@ -131,7 +131,7 @@ def _step_if_stiff(scene, run, h_max, tolerance, scratch):
         return False, -1, 0.0, run.y, run.record, control, 0.0
     if control.last_h == 0.0:
         # The transient into creep decays at this rate.
-        control = StepControl(min(control.h, -1.0 / start.linear[1][1][1]), 0.0, 0.0, True)
+        control = start_control(min(control.h, -1.0 / start.linear[1][1][1]))
     guard, s, y, record, control, error = implicit_step(scene, run.record, start, control, h_max, tolerance, scratch)
     return True, guard, s, y, record, control, error
 
@@ -168,7 +168,7 @@ def _step_by_stiffness(family, scene, run, h_max, tolerances, scratch):
     guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch)
     local, record = run.local, _goes_on(scene, run, guard, record)
     local = LocalErrors(local.series + shared, local.rate, local.implicit)
-    return False, guard, s, y, record, start_control(scene), local
+    return False, guard, s, y, record, start_control(scene.span), local
 
 
 @_step_of_family.implements(Dynamic)
@@ -367,7 +367,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         begun = _begin_record(family(scene.law), scene, mode, now, y, tolerances, c)
         record = recorder.lend(scene, begun, take(rows, i))
         record = recorder.after_event(scene, record, mode, mode, t)
-        control = start_control(scene)
+        control = start_control(1e-6 * scene.span)
         audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0)
         n = stalled = 0
         t_before, s = t, scene.span

@@ -242,7 +242,7 @@ def _fraction_below_zero(samples, work):
 
 
 # Largest factor by which the length of a step grows.
-_MOST_GROWTH = 6.0
+_MOST_GROWTH = 30.0
 
 
 class StepControl(NamedTuple):
@@ -267,9 +267,9 @@ class StepControl(NamedTuple):
 
 
 @inlined
-def start_control(scene):
-    """Control of the first implicit step."""
-    return StepControl(1e-6 * scene.span, 0.0, 0.0, True)
+def start_control(h):
+    """Control of a first implicit step, of which the length is at most `h`."""
+    return StepControl(h, 0.0, 0.0, True)
 
 
 @inlined
