@@ -27,6 +27,7 @@ from ringsweep.physics.friction.velocity import (
     region_at,
     region_bounds,
     series_term,
+    shorten_for_decay,
     stiction_band,
 )
 
@@ -393,3 +394,12 @@ def test_unusable_file_in_ringsweep_laws_is_refused_in_one_line(tmp_path, name):
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "RINGSWEEP_LAWS" in done.stderr
+
+
+@given(st.tuples(powers(1e-3, 1e3), powers(1e-6, 1e6), powers(1e-6, 1e6)))
+def test_step_ends_where_an_exponential_may_have_changed_by_its_most(drawn):
+    """First and second power of the time share the bound; one of them alone has all of it."""
+    sharpness, rate, bend = drawn
+    for v in ((0.0, rate, bend), (0.0, rate, 0.0), (0.0, 0.0, -bend)):
+        h = shorten_for_decay(sharpness, v, inf)
+        assert sharpness * (abs(v[1]) * h + abs(v[2]) * h * h) == pytest.approx(8.0)

@@ -470,5 +470,6 @@ def shorten_for_decay(sharpness, v, h):
     """
     if sharpness == 0.0:
         return h
-    longest = 0.5 * _MAX_EXPONENT / sharpness
-    return min(h, min(longest / abs(v[1]), sqrt(longest / abs(v[2]))))
+    # Solution of |v[1]| h + |v[2]| h^2 = most.
+    most, rate = _MAX_EXPONENT / sharpness, abs(v[1])
+    return min(h, 2.0 * most / (rate + sqrt(rate * rate + 4.0 * most * abs(v[2]))))
