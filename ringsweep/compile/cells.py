@@ -45,8 +45,8 @@ class Cells:
     Attributes
     ----------
     batch : nested tuple of ndarray
-    layout : tuple
-        Kind of the cells. Cells of equal kinds are of one Numba type.
+    kind : CellsType
+        Numba type of the cells.
     address : int
         Address of the first cell.
     """
@@ -54,7 +54,7 @@ class Cells:
     def __init__(self, batch: Any) -> None:
         """Copy the numbers of a batch, and the addresses of its longer arrays, into the block."""
         leaves = [leaf if leaf.ndim == 1 else _with_whole_rows(leaf) for leaf in _leaves(batch)]
-        self.batch, self.layout = batch, _layout(batch)
+        self.batch, self.kind = batch, _cells_type(_layout(batch))
         # The block holds the addresses of these arrays.
         self._arrays = [leaf for leaf in leaves if leaf.ndim > 1]
         self._block = np.empty((len(leaves[0]), sum(leaf.ndim for leaf in leaves)))
@@ -133,8 +133,8 @@ class CellsType(types.Type):
 
     @property
     def key(self) -> Any:
-        """What tells types apart."""
-        return self.cell
+        """What tells types apart: the number that Numba gives a type, since each call hashes that of its cells."""
+        return self.cell._code
 
     @property
     def mangling_args(self) -> Any:
@@ -193,7 +193,7 @@ register_model(Reference)(models.OpaqueModel)
 @typeof_impl.register(Cells)
 def _type_of_cells(cells: Any, context: Any) -> Any:
     """Numba type of :class:`Cells` that a kernel is given; Numba calls it."""
-    return _cells_type(cells.layout)
+    return cells.kind
 
 
 @cache

@@ -343,9 +343,9 @@ def integrate(batch, tolerances, max_steps, results, history):
         Number of rows of the history.
     """
     cells = Cells(batch)
-    if cells.layout not in _SHAPES:
-        _SHAPES[cells.layout] = series.table_shape(take(batch, 0))
-    count: int = _integrate(cells, tolerances, max_steps, results, history, scratch_for(*_SHAPES[cells.layout]))
+    if cells.kind not in _SHAPES:
+        _SHAPES[cells.kind] = series.table_shape(take(batch, 0))
+    count: int = _integrate(cells, tolerances, max_steps, results, history, scratch_for(*_SHAPES[cells.kind]))
     return count
 
 
