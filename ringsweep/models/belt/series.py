@@ -318,7 +318,8 @@ def _seen_at_on_belt(scene, mode, c, s, h):
         velocity = 0.0
     x, v, force, acceleration = value(c[X], s), value(c[V], s), value(c[FORCE], s), value(c[ACCELERATION], s)
     yielding = holds_in_band(scene.law) and mode.region < 0
-    if s == h and mode.sign != 0 and not yielding:
+    if mode.sign != 0 and not yielding:
+        # Where the law bends, the series of friction is less exact than that of the motion.
         sign, body = float(mode.sign), scene.body
         mu, _ = friction_in(scene.law, mode.region, sign * v, (scene.mu_s, scene.mu_k))
         load, _ = ring.reactions(body, 0.0, 0.0, (x, 0.0, velocity))

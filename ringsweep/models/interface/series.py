@@ -117,7 +117,7 @@ def seen_at_start(scene, c):
 def seen_at(scene, mode, c, s, h):
     """State within a step as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
 
-    At the end of the step, where a series of friction is least exact, forces follow from the law and the state.
+    Forces follow from the law and the state: where the law bends, their own series are less exact.
 
     Parameters
     ----------

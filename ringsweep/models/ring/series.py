@@ -596,7 +596,8 @@ def _seen_at_on_ring(scene, mode, c, s, h):
     """Implement :func:`series.seen_at`: what ``_observe_on_ring`` in :mod:`record` takes."""
     phi, omega, epsilon = value(c[PHI], s), value(c[OMEGA], s), value(c[EPSILON], s)
     normal_1, normal_2 = value(c[NORMAL_1], s), value(c[NORMAL_2], s)
-    if s == h and mode.sign != 0:
+    if mode.sign != 0:
+        # Where the law bends, the series of the reactions is less exact than that of the motion.
         K1, K2 = friction_under(scene, mode, abs(value(c[V], s)))
         motion = value(c[SIN], s), value(c[COS], s), omega
         epsilon, _ = ring.acceleration(scene.body, K1, K2, motion)
