@@ -23,6 +23,14 @@ from ringsweep.solvers.rk4 import RK4
 NAMES = MODELS["ring"].outcomes
 COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for name in ("mu_s", "mu_k")]
 
+#: Random scenes with steps that two runs share: a mode that lasts for one step; a long step of a slow creep; the end of
+#: the elastic range of bristles within a step.
+BOUNDED = [
+    (101, Kind("ring", "hyperbolic", "sinusoidal", arcs=1)),
+    (201, Kind("ring", "tanh", "sinusoidal", arcs=1)),
+    (101, Kind("belt", "elasto-plastic", force="harmonic", span=(1.0, 8.0))),
+]
+
 
 @pytest.fixture
 def rocking(cells):
@@ -283,15 +291,23 @@ class TestErrors:
         assert np.nanmedian(np.concatenate(ratios)) < median_of_all
 
     @pytest.mark.slow
-    def test_bounds_cover_errors_of_modes_that_last_for_one_step(self):
-        """Two runs take the same such step, so their difference does not show its error."""
-        kind = Kind("ring", "hyperbolic", "sinusoidal", arcs=1)
-        run = random_scenes(kind, 300, np.random.default_rng(101))
-        first, exact = run.outcomes(), run.outcomes(solver={"method": "event", "rtol": 1e-14})
-        certain = (first.certified == 1) & (exact.certified == 1)
-        for name in ("phi_end", "omega_end", "phi_min", "omega_min", "omega_max"):
-            bound = first[f"{name}_error"] + exact[f"{name}_error"]
-            assert float((abs(first[name] - exact[name]) / bound)[certain].max()) < 3.0
+    @pytest.mark.parametrize(("seed", "kind"), BOUNDED)
+    def test_no_number_errs_by_more_than_three_bounds(self, seed, kind):
+        """Two runs may share a step, and bend in it: their difference does not show its error."""
+        run = random_scenes(kind, 300, np.random.default_rng(seed))
+        tight = (
+            {"method": "event", "rtol": 1e-14} if kind.law == "hyperbolic" else {"method": "implicit", "rtol": 1e-12}
+        )
+        first, exact = run.outcomes(), run.outcomes(solver=tight)
+        alike = (first.certified == 1) & (exact.certified == 1) & (first.regime == exact.regime)
+        bounded = [name for name in first if f"{name}_error" in first and first[name].dims == ("cell",)]
+        bounds = [first[f"{name}_error"] + exact[f"{name}_error"] for name in bounded]
+        ratios = np.stack([
+            np.where(alike & (bound > 0.0), abs(first[name] - exact[name]) / bound, np.nan)
+            for name, bound in zip(bounded, bounds, strict=True)
+        ])  # fmt: skip
+        assert np.nanmax(ratios) < 3.0
+        assert (ratios > 1.0).sum() <= 0.003 * np.isfinite(ratios).sum()
 
     @pytest.mark.slow
     def test_difference_that_is_small_by_chance_does_not_make_the_bound_small(self):

@@ -30,6 +30,10 @@ _INTERPOLATION = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1
 _ACCELERATION_FACTOR = 100.0
 
 
+# A polynomial through five instants of a step is too coarse to find an extreme of a quantity if it errs there by this
+# share of the change of the quantity. Then the extreme is found to this fraction of the step, by so many trials.
+_COARSE, _NEAR, _MOST_TRIALS = 1e-4, 1e-6, 40
+
 # Error of the dense output at an extreme, as a share of what the extreme exceeds the ends of the step by.
 _DENSE_ERROR = 0.01
 
@@ -443,8 +447,58 @@ def _add_extremes(scene, record, start, scratch, taken, views):
             count = crossings(row, 1.0, work, count)
         if may_turn:
             differentiate(row, row)
-            count = crossings(row, 1.0, work, count)
+            first_turn, count = count, crossings(row, 1.0, work, count)
+            for i in range(first_turn, count):
+                work[0][i] = _turn_near(scene, record, start, scratch, taken, q, first[q][0], work[0][i])
     return count, True
+
+
+@inlined
+def _turn_near(scene, record, start, scratch, taken, q, value_before, turn):
+    """Fraction of a step at which a quantity has an extreme, from the one at which a polynomial has it.
+
+    In a long step the polynomial may be coarse, and where a law bends it cuts the corner. Brent's method then finds the
+    extreme of the quantity itself, along the dense output.
+
+    `q` is the quantity, `value_before` its value at the beginning of the step. ``work[-1]`` holds the derivative of the
+    polynomial.
+    """
+    row = scratch.work[-1]
+    upwards = 1.0 if row[1] + turn * (2.0 * row[2] + turn * 3.0 * row[3]) < 0.0 else -1.0
+    rise = turn * (row[0] + turn * (row[1] / 2.0 + turn * (row[2] / 3.0 + turn * row[3] / 4.0)))
+    low, high = max(turn - 1.0 / INSTANTS, 0.0), min(turn + 1.0 / INSTANTS, 1.0)
+    best = second = third = fraction = turn
+    f_best = f_second = f_third = -inf
+    move = last_move = 0.0
+    for i in range(_MOST_TRIALS):
+        view = _view_within(scene, start, scratch, taken, fraction)
+        f = upwards * (implicit.sought(scene, record, view)[q][0] - value_before)
+        if i == 0:
+            if abs(f - upwards * rise) <= _COARSE * abs(f):
+                return turn
+            best = second = third = turn
+            f_best = f_second = f_third = f
+        elif f >= f_best:
+            low, high = (best, high) if fraction > best else (low, best)
+            third, f_third, second, f_second, best, f_best = second, f_second, best, f_best, fraction, f
+        else:
+            low, high = (low, fraction) if fraction > best else (fraction, high)
+            if f >= f_second or second == best:
+                third, f_third, second, f_second = second, f_second, fraction, f
+            elif f >= f_third or third in (best, second):
+                third, f_third = fraction, f
+        if high - low < 4.0 * _NEAR:
+            break
+        # A parabola through the three best points, if it moves less than half as far as the move before last.
+        to_second, to_third = (best - second) * (f_best - f_third), (best - third) * (f_best - f_second)
+        bend, before_last = 2.0 * (to_third - to_second), last_move
+        last_move = move
+        move = ((best - third) * to_third - (best - second) * to_second) / bend if bend != 0.0 else inf
+        if not (abs(move) < 0.5 * abs(before_last) and low < best - move < high):
+            last_move = (high if best < 0.5 * (low + high) else low) - best
+            move = -0.381966 * last_move
+        fraction = best - (move if abs(move) > _NEAR else _NEAR if move > 0.0 else -_NEAR)
+    return best
 
 
 @inlined
