@@ -3,6 +3,7 @@
 import json
 import os
 import re
+from concurrent.futures import ThreadPoolExecutor
 
 import matplotlib
 import numpy as np
@@ -385,6 +386,26 @@ def test_cells_beyond_the_stability_limit_have_another_hatch():
 
 def test_notebook_shows_a_picture_without_the_inline_magic():
     assert plots.history(make_history())._repr_png_().startswith(b"\x89PNG")
+
+
+def test_pyplot_shows_a_whole_figure_where_it_opens_windows():
+    from matplotlib import pyplot
+
+    def shown(backend, call=lambda function: function()):
+        pyplot.switch_backend(backend)
+        figures = call(lambda: [plots.regime_map(make_sweep()), plots.history(make_history())])
+        return [figure.canvas.manager is not None for figure in figures]
+
+    before = pyplot.get_backend()
+    try:
+        assert shown("webagg") == [True, True]
+        with ThreadPoolExecutor(1) as threads:
+            assert shown("webagg", lambda function: threads.submit(function).result()) == [False, False]
+        # These draw files: a figure would only stay in memory.
+        assert shown("agg") == [False, False]
+    finally:
+        pyplot.close("all")
+        pyplot.switch_backend(before)
 
 
 def test_map_axis_may_have_a_single_value():

@@ -41,7 +41,7 @@ def fit(ds: xr.Dataset) -> Figure:
     """
     if not {"measured", "fitted"} <= set(ds):
         raise InputError("ds", "is no fit: ringsweep fit makes one")
-    figure = look.Picture(figsize=(look.figure_width(), 0.7 * look.figure_width()), layout="constrained")
+    figure = look.picture(look.figure_width(), 0.7 * look.figure_width())
     data, rest = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     one, two = look.pair(0), look.pair(1)
     time, unit = ds["t"].values, unit_text(ds["measured"])

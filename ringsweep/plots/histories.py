@@ -99,7 +99,7 @@ def history(ds: xr.Dataset) -> Figure:
     width = look.figure_width()
     # Panels must be as high as their labels.
     height = min(max(0.2 * width, 13.5 * rcParams["font.size"] / 100.0), 1.9)
-    figure = look.Picture(figsize=(width, height * sum(heights) + 0.8), layout="constrained")
+    figure = look.picture(width, height * sum(heights) + 0.8)
     grid = figure.add_gridspec(len(heights), 1 + many, height_ratios=heights)
     columns = [[figure.add_subplot(grid[k, column]) for k in range(rows)] for column in range(1 + many)]
     details = [figure.add_subplot(grid[k, :]) for k in range(rows, len(heights))]

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import math
 import re
+import sys
 import textwrap
+import threading
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -14,6 +16,7 @@ import numpy as np
 from matplotlib import colors, transforms
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends import backend_registry
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotParams
 from matplotlib.legend import Legend
@@ -208,9 +211,25 @@ class Picture(Figure):
         return written.getvalue()
 
 
-def panel(draw: Callable[..., Any], result: Any, height: float = 4.2, **options: Any) -> Picture:
+def picture(width: float, height: float) -> Figure:
+    """A new figure of this size, inches. If pyplot is imported and opens windows, it is one of pyplot's figures.
+
+    So ``plt.show()`` shows it. Elsewhere pyplot would only keep it in memory.
+    """
+    size: dict[str, Any] = {"figsize": (width, height), "layout": "constrained"}
+    pyplot: Any = sys.modules.get("matplotlib.pyplot")
+    # Windows belong to the main thread.
+    if pyplot is not None and threading.current_thread() is threading.main_thread():
+        _, framework = backend_registry.resolve_backend(matplotlib.get_backend())
+        # A notebook shows a picture by itself.
+        if framework not in (None, "nbagg", "ipympl"):
+            return pyplot.figure(FigureClass=Picture, **size)
+    return Picture(**size)
+
+
+def panel(draw: Callable[..., Any], result: Any, height: float = 4.2, **options: Any) -> Figure:
     """A new figure with one picture."""
-    figure = Picture(figsize=(7.6, height), layout="constrained")
+    figure = picture(7.6, height)
     draw(result, ax=figure.add_subplot(), **options)
     return figure
 

@@ -122,7 +122,7 @@ def regime_map(
         return bifurcation(ds, x, var, sel)
     width = look.figure_width()
     if kind != "map":
-        figure = look.Picture(figsize=(width, 0.65 * width), layout="constrained")
+        figure = look.picture(width, 0.65 * width)
         one, ax = select(ds, sel or {})[0], figure.add_subplot()
         _ = multiplier_circle(one, x, ax) if kind == "circle" else probability_panel(one, ax)
         return figure
@@ -137,7 +137,7 @@ def regime_map(
         return found.draw_panels(width, title, legend)
     height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
     extra = 0.7 if look.is_narrow(width) else 0.3
-    figure = look.Picture(figsize=(width, height * width + extra), layout="constrained")
+    figure = look.picture(width, height * width + extra)
     ax = figure.add_subplot()
     found.draw_alone(ax, title, legend)
     if boundaries is not None:
@@ -346,7 +346,7 @@ class Map:
         titles = ["\n".join(look.folded([text], each) for text in texts) for texts, _ in self.panels]
         lines = max(title.count("\n") + 1 for title in titles)
         height = rows * (0.75 * each + 0.0175 * rcParams["font.size"] * lines) + 1.3
-        figure = look.Picture(figsize=(width, height), layout="constrained")
+        figure = look.picture(width, height)
         grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes in grid.flat[count:]:
             axes.remove()

@@ -56,7 +56,7 @@ def work_precision(ds: xr.Dataset, error: str = "error_end") -> Figure:
     ringsweep.errors.InputError: ds: has no contender, cell, time_per_run, method: it is not error against run time
     """
     width = look.figure_width()
-    figure = look.Picture(figsize=(width, (1.15 if look.is_narrow(width) else 0.63) * width), layout="constrained")
+    figure = look.picture(width, (1.15 if look.is_narrow(width) else 0.63) * width)
     precision_panel(ds, error, figure.add_subplot())
     return figure
 

@@ -93,7 +93,7 @@ def bifurcation(
     below = {name: draw for name, draw in _BELOW.items() if name in ds and bool(np.isfinite(ds[name]).any())}
     heights = [_HEIGHTS[name] for name in ("diagram", *below)]
     width = look.figure_width()
-    figure = look.Picture(figsize=(width, sum(heights) * width + 0.6), layout="constrained")
+    figure = look.picture(width, sum(heights) * width + 0.6)
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     bifurcation_panel(ds, x, var, panels[0])
     for draw, ax in zip(below.values(), panels[1:], strict=True):
