@@ -1,10 +1,10 @@
 """Pictures of datasets.
 
 ``regime_map``, ``bifurcation``, ``history``, ``fit`` and ``work_precision`` return a new figure. If pyplot is imported
-and opens windows, ``plt.show()`` shows it and ``plt.close(figure)`` frees it. Elsewhere it is no figure of pyplot: there
-is no global state. A function with an argument ``ax`` draws one picture in these axes and returns them. Without ``ax``
-it draws in pyplot's current axes. Every picture has an opaque white background, in dark notebooks too, unless ``style``
-chooses another look.
+and opens windows, ``plt.show()`` shows it and ``plt.close(figure)`` frees it. Elsewhere it is no figure of pyplot:
+there is no global state. A function with an argument ``ax`` draws one picture in these axes and returns them. Without
+``ax`` it draws in pyplot's current axes. Every picture has an opaque white background, in dark notebooks too, unless
+``style`` chooses another look.
 """
 
 from __future__ import annotations
