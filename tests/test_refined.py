@@ -12,7 +12,6 @@ from benchmarks.hostile.attack import same_bits
 from benchmarks.hostile.kills import killed_at
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
-from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.variables import AUDITED, INFERRED, LABELS
 from ringsweep.runs import sweep
 from ringsweep.storage import netcdf
@@ -110,17 +109,6 @@ class TestFile:
         for name in ("regime", "motion", "separating_contact", "origin", "t_end"):
             np.testing.assert_array_equal(found[name].sel(friction_law="stiction"), alone[name])
 
-    def test_number_asked_for_is_interpolated_within_its_error(self, scene, full):
-        asked = REFINE | {"also": "t_separation", "within": 1e-2}
-        found = ringsweep.sweep(scene, AXES, refine=asked, progress=False)
-        inferred = found.origin.values == INFERRED
-        with xr.open_dataset(full, decode_times=False) as whole:
-            error = np.abs(found.t_separation - whole.t_separation).values
-        assert (np.isfinite(found.t_separation) == (found.regime == REGIMES.index("separating"))).all()
-        assert np.isfinite(error[inferred]).any()
-        assert np.nanquantile(error[inferred], 0.95) < 1e-2
-        assert np.isnan(found.t_end.values[inferred]).all()
-
     def test_info_and_map_tell_the_audit(self, refined, ds, capsys, tmp_path):
         assert cli.main(["info", str(refined)]) == 0
         out = capsys.readouterr().out
@@ -216,9 +204,6 @@ class TestConfiguration:
             ({"strid": 8}, "sweep.refine.strid", "did you mean `stride`"),
             ({"stride": 0}, "sweep.refine.stride", "at least 1"),
             ({"audit": 2}, "sweep.refine.audit", "at most 1"),
-            ({"also": "t_separation"}, "sweep.refine.within", "missing"),
-            ({"also": "steps", "within": 1}, "sweep.refine.also", "no number of this model"),
-            ({"also": "t_end", "within": "1 m"}, "sweep.refine.within", "m"),
             ({"axes": ["body.mass"]}, "sweep.refine.axes.0", "no axis of numbers"),
             (3, "sweep.refine", "a section with keys"),
         ],

@@ -4,28 +4,27 @@ import numpy as np
 import pytest
 
 from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
-from ringsweep.runs.decisions import Answer, largest_number, refine
+from ringsweep.runs.decisions import largest_number, refine
 
 SIZE = 257
 
 
-def refined(truth, certain=None, stride=32, audit=0.02, values=None, **options):
+def refined(truth, certain=None, stride=32, audit=0.02, **options):
     """Refine a map of labels; returns the result and the number of cells of each round."""
     truth = np.asarray(truth)
     shape = truth.shape if truth.ndim == 3 else (1, *truth.shape)
-    certain = np.ones(truth.size, dtype=bool) if certain is None else np.ravel(certain)
-    decisions = refine(shape, stride, audit, **options)
-    asked, answer = [], None
-    try:
-        while True:
-            asked.append(decisions.send(answer))
-            numbers = None if values is None else np.ravel(values)[asked[-1]]
-            answer = Answer(truth.ravel()[asked[-1]], certain[asked[-1]], numbers)
-    except StopIteration as end:
-        cells = np.concatenate(asked)
-        assert len(np.unique(cells)) == len(cells), "a cell is asked for twice"
-        np.testing.assert_array_equal(np.sort(cells), np.flatnonzero(end.value.origin != INFERRED))
-        return end.value, [len(cells) for cells in asked]
+    labels = truth.ravel() if certain is None else np.where(np.ravel(certain), truth.ravel(), ~truth.ravel())
+    asked = []
+
+    def run(cells):
+        asked.append(cells)
+        return labels[cells]
+
+    found = refine(shape, stride, audit, run, **options)
+    cells = np.concatenate(asked)
+    assert len(np.unique(cells)) == len(cells), "a cell is asked for twice"
+    np.testing.assert_array_equal(np.sort(cells), np.flatnonzero(found.origin != INFERRED))
+    return found, [len(cells) for cells in asked]
 
 
 def wrong(found, truth):
@@ -198,34 +197,3 @@ class TestAudit:
         # Maps on which nothing is missed would show nothing.
         if kind is not stripes:
             assert missed >= 5
-
-
-class TestNumbers:
-    def test_interpolated_numbers_are_as_close_as_asked_for(self):
-        y, x = plane(200)
-        truth = (x + y > 1.2).astype(int)
-        values = np.where(truth == 1, np.sin(3 * x) * np.exp(y), np.nan)
-        found, asked = refined(truth, values=values, within=1e-3, stride=16)
-        assert not wrong(found, truth).any()
-        assert np.nanmax(np.abs(found.values[0] - values)) < 2e-3
-        audited = found.origin[0] == AUDITED
-        assert np.array_equal(np.isnan(found.values[0]), np.isnan(values))
-        assert audited.any()
-        assert sum(asked) < 0.25 * truth.size
-
-    def test_audit_counts_the_numbers_that_are_further_off_than_allowed(self):
-        """Waves of the length of a coarse block look flat on the coarse lattice."""
-        y, x = np.indices((257, 257))
-        values = np.sin(2 * np.pi * x / 32) * np.sin(2 * np.pi * y / 32)
-        found, _ = refined(np.zeros((257, 257), dtype=int), values=values, within=1e-2)
-        inferred = found.origin[0] == INFERRED
-        far = (np.abs(found.values[0] - values) > 1e-2)[inferred].mean()
-        assert found.audit.wrong == 0
-        assert found.audit.far > 0
-        assert far <= found.audit.far_bound
-
-    def test_end_of_the_numbers_within_one_label_is_followed(self):
-        y, x = plane(200)
-        values = np.where(x**2 + y**2 < 0.4, x + y, np.nan)
-        found, _ = refined(np.zeros((200, 200), dtype=int), values=values, within=1e-2, audit=0.0)
-        np.testing.assert_array_equal(np.isnan(found.values[0]), np.isnan(values))

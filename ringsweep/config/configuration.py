@@ -220,7 +220,7 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     if (sample := read_sample(sweep.get("sample"), scene, axes)) is None:
         check_consistency(scene, axes)
     given = tree.get("sweep", {})
-    refine, follow = read_refinement(given.get("refine"), scene, axes), read_follow(given.get("follow"), scene, axes)
+    refine, follow = read_refinement(given.get("refine"), axes), read_follow(given.get("follow"), scene, axes)
     parts = {"refine": refine, "sample": sample, "follow": follow, "section": scene.structure.section}
     for one, other, why in _EXCLUDING:
         if parts[one] is not None and parts[other] is not None:

@@ -8,21 +8,16 @@ from typing import Any
 import numpy as np
 
 from ringsweep.config.axes import Axes, dimension
-from ringsweep.config.scene import outcome_numbers
 from ringsweep.config.sections import Key, Keys, one_of, read_keys
 from ringsweep.errors import InputError
-from ringsweep.models import model_of
-from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.units import show
 
 #: Keys of ``sweep.refine``.
 KEYS: Keys = {
     "stride": Parameter("1", "cells from one cell of the first round to the next", lower=1, upper=1024, whole=True,
                         default=32),
     "audit": Parameter("1", "share of the inferred cells that is computed after all", lower=0, upper=1, default=0.02),
-    "also": Key("number that is interpolated where not run"),
-    "within": Key("largest error of that"),
     "axes": Key("one or two paths that are refined (default: the longest two)"),
 }  # fmt: skip
 
@@ -39,27 +34,20 @@ class Refinement:
         Cells from one cell of the first round to the next.
     audit : float
         Share of the inferred cells that is computed after all.
-    also : str, optional
-        Variable that is interpolated where a cell is inferred.
-    within : float, optional
-        Largest error of that, in the unit of the variable.
     """
 
     dims: tuple[str, ...]
     stride: int
     audit: float
-    also: str | None = None
-    within: float | None = None
 
 
-def read_refinement(given: Any, scene: Scene, axes: Axes) -> Refinement | None:
+def read_refinement(given: Any, axes: Axes) -> Refinement | None:
     """Read and validate the value under ``sweep.refine``, or under ``refine`` in Python.
 
     Parameters
     ----------
     given : mapping or bool or None
         True stands for the defaults.
-    scene : Scene
     axes : Axes
 
     Raises
@@ -70,8 +58,7 @@ def read_refinement(given: Any, scene: Scene, axes: Axes) -> Refinement | None:
     if given is None or given is False:
         return None
     section = read_keys({} if given is True else given, KEYS, "sweep.refine")
-    also, within = _also(section["also"], section["within"], scene)
-    return Refinement(_dims(section["axes"], axes), section["stride"], section["audit"], also, within)
+    return Refinement(_dims(section["axes"], axes), section["stride"], section["audit"])
 
 
 def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
@@ -96,17 +83,3 @@ def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
             raise InputError(f"sweep.grid.{path}", problem)
     # In the order of the grid.
     return tuple(dimension(path) for path in names if path in chosen)
-
-
-def _also(also: Any, within: Any, scene: Scene) -> tuple[str | None, float | None]:
-    """The variable that is interpolated, and its largest error."""
-    if also is None and within is None:
-        return None, None
-    for there, lacks, given in (("also", "within", within), ("within", "also", also)):
-        if given is None:
-            problem = f"missing: `{there}` needs it, for example `also: t_separation, within: 1e-3`"
-            raise InputError(f"sweep.refine.{lacks}", problem)
-    name = one_of(also, outcome_numbers(scene), "sweep.refine.also", "is no number of this model")
-    unit = model_of(scene.structure).variables[name].unit
-    error = Parameter(unit, f"largest error of {name} where it is interpolated", lower=0, open_lower=True)
-    return name, quantity(within, error, "sweep.refine.within")

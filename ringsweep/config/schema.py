@@ -189,7 +189,7 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(_VALUE), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
-    refined = _keys(REFINE, also=_TEXT, within=_VALUE, axes=_list(names, maxItems=2))
+    refined = _keys(REFINE, axes=_list(names, maxItems=2))
     grid = "path -> values; every combination is run; paths with commas between them vary together"
     of_laws = {LAW: laws | {"uniqueItems": True}}
     points = "CSV file whose columns are paths and whose rows are runs, or its columns"

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Generator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,29 +24,13 @@ from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
 #: Confidence of the bound on wrong cells.
 CONFIDENCE = 0.95
 
-_BESIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 _NEAR = tuple((down, right) for down in range(-3, 4) for right in range(-3, 4) if 0 < abs(down) + abs(right) <= 3)
 
 Cells = NDArray[np.intp]
 
-
-@dataclass(frozen=True)
-class Answer:
-    """What was computed in some cells, each array of shape ``(cells,)``.
-
-    Attributes
-    ----------
-    labels : ndarray of int
-        Classification of each cell, at least 0.
-    certain : ndarray of bool
-        Whether a neighbour may take the label. Beside a cell that is not certain every cell is computed.
-    values : ndarray of float, optional
-        Numbers that shall be interpolated; NaN where there is none.
-    """
-
-    labels: NDArray[np.integer]
-    certain: NDArray[np.bool_]
-    values: NDArray[np.float64] | None = None
+#: Runs the cells at some flat indices, and returns the label of each: at least 0, or its complement, which is negative,
+#: if the cell is not certain. A neighbour cannot take the label of such a cell, so beside it every cell is run.
+Run = Callable[[Cells], NDArray[np.int16]]
 
 
 @dataclass(frozen=True)
@@ -63,18 +47,12 @@ class Findings:
         Cells inferred wrongly that were found, the drawn ones and those that following them has found.
     bound : float
         Upper bound, at 95 % confidence, on the share of wrong cells among those that are still inferred.
-    far : int, optional
-        How many of the drawn cells had a number that was missing, or further off than allowed; None without numbers.
-    far_bound : float, optional
-        Upper bound on the share of such cells among those that are still inferred.
     """
 
     cells: int
     wrong: int
     corrected: int
     bound: float
-    far: int | None = None
-    far_bound: float | None = None
 
 
 @dataclass(frozen=True)
@@ -88,21 +66,16 @@ class Decided:
         `COMPUTED`, `INFERRED` or `AUDITED`.
     level : ndarray of int8
         How often the coarse block around the cell was halved when the cell was computed or inferred.
-    values : ndarray of float, optional
-        Numbers that were interpolated where a cell is inferred.
     audit : Findings
     """
 
     labels: NDArray[np.int16]
     origin: NDArray[np.int8]
     level: NDArray[np.int8]
-    values: NDArray[np.float64] | None
     audit: Findings
 
 
-def refine(
-    shape: tuple[int, int, int], stride: int, audit: float, *, within: float | None = None, seed: int = 0
-) -> Generator[Cells, Answer, Decided]:
+def refine(shape: tuple[int, int, int], stride: int, audit: float, run: Run, *, seed: int = 0) -> Decided:
     """Refine the last two axes of a grid.
 
     Parameters
@@ -113,51 +86,36 @@ def refine(
         Rows and columns from one point of the coarse lattice to the next.
     audit : float
         Share of the inferred cells that are audited.
-    within : float, optional
-        Largest error of numbers that are interpolated between computed cells.
+    run : callable
+        Runs cells; it is called with no cell twice.
     seed : int
         Seed of the audit.
-
-    Yields
-    ------
-    ndarray of int
-        Flat indices of the cells whose :class:`Answer` must be sent, ascending. None is asked for twice.
-
-    Returns
-    -------
-    Decided
     """
-    grid = _Grid(shape, stride, within)
-    yield from grid.compute(np.arange(grid.labels.size))
+    grid = _Grid(shape, stride, run)
+    grid.compute(np.arange(grid.labels.size))
     while not grid.is_finest:
-        yield from grid.halve()
-    return (yield from _audited(grid, audit, np.random.default_rng(seed)))
+        grid.halve()
+    return _audited(grid, audit, np.random.default_rng(seed))
 
 
 class _Grid:
-    """A lattice in a grid that becomes finer; `labels`, `known` and `values` are those of its points.
+    """A lattice in a grid that becomes finer; `labels`, `known` and `level` are those of its points."""
 
-    A label of a cell that is not certain is stored as its complement, which is negative.
-    """
-
-    def __init__(self, shape: tuple[int, int, int], stride: int, within: float | None):
-        self.shape, self.stride, self.within = shape, stride, within
+    def __init__(self, shape: tuple[int, int, int], stride: int, run: Run):
+        self.shape, self.stride, self.run = shape, stride, run
         self.rows, self.columns = (_coarse(size, stride) for size in shape[1:])
         self.depth = 0
         lattice = shape[0], len(self.rows), len(self.columns)
         self.labels = np.zeros(lattice, dtype=np.int16)
         self.known = np.zeros(lattice, dtype=bool)
         self.level = np.zeros(lattice, dtype=np.int8)
-        self.values = None if within is None else np.full(lattice, np.nan)
-        # Whether the numbers around a point are too far from linear to be interpolated.
-        self.rough = None if within is None else np.ones(lattice, dtype=bool)
 
     @property
     def is_finest(self) -> bool:
         """Whether the lattice is the grid."""
         return self.labels.shape == self.shape
 
-    def halve(self) -> Generator[Cells, Answer]:
+    def halve(self) -> None:
         """Halve all intervals, and compute what cannot be inferred."""
         self.depth += 1
         (rows, *row_parents), (columns, *column_parents) = _halved(self.rows), _halved(self.columns)
@@ -172,44 +130,28 @@ class _Grid:
         ancestor = np.minimum.reduce([self.level[:, r][:, :, c] for r, c in corners])
         inferred = [~self.known[:, r][:, :, c] for r, c in corners]
         level = np.where(~is_old & agree & np.logical_or.reduce(inferred), ancestor, level)
-        needed = ~agree & ~is_old
-        if self.values is not None and self.rough is not None:
-            rough = np.logical_or.reduce([self.rough[:, r][:, :, c] for r, c in corners])
-            values = self._interpolated(rows, columns, row_parents, column_parents)
-            numbers = [np.isfinite(self.values[:, r][:, :, c]) for r, c in corners]
-            # Where only some corners have a number, the place where numbers end lies between them.
-            ends = np.logical_or.reduce(numbers) & ~np.logical_and.reduce(numbers)
-            needed |= ~is_old & (ends | rough & np.isfinite(values))
-            self.values, self.rough = values, np.zeros(agree.shape, dtype=bool)
         self.known = self.known[:, row_parents[0]][:, :, column_parents[0]] & is_old
         self.labels, self.level = around[0], level.astype(np.int8)
         self.rows, self.columns = rows, columns
-        yield from self.compute(np.flatnonzero(needed))
-        yield from self.follow(self._beside_others())
+        self.compute(np.flatnonzero(~agree & ~is_old))
+        self.follow(self._beside_others())
         while len(near_thin := self._near_thin()):
-            yield from self.follow(near_thin)
+            self.follow(near_thin)
 
-    def follow(self, cells: Cells) -> Generator[Cells, Answer]:
+    def follow(self, cells: Cells) -> None:
         """Compute points, and those near them that differ from them where they differ from what was inferred."""
         while len(cells):
-            surprising = yield from self.compute(cells)
+            surprising = self.compute(cells)
             cells = self._differing_near(cells[surprising])
 
-    def compute(self, points: Cells) -> Generator[Cells, Answer, NDArray[np.bool_]]:
+    def compute(self, points: Cells) -> NDArray[np.bool_]:
         """Compute points of the lattice that are not known; returns which differ from what was inferred."""
         if not len(points):
             return np.zeros(0, dtype=bool)
         layer, row, column = np.unravel_index(points, self.labels.shape)
-        answer = yield np.ravel_multi_index((layer, self.rows[row], self.columns[column]), self.shape)
-        labels = np.where(answer.certain, answer.labels, ~answer.labels.astype(np.int16))
+        labels = self.run(np.ravel_multi_index((layer, self.rows[row], self.columns[column]), self.shape))
         surprising = self.labels.flat[points] != labels
         self.labels.flat[points], self.known.flat[points], self.level.flat[points] = labels, True, self.depth
-        if self.values is not None and self.rough is not None and answer.values is not None:
-            # Not <=, so that NaN on one side is too far.
-            far = ~(np.abs(self.values.flat[points] - answer.values) <= self.within)
-            far &= ~(np.isnan(self.values.flat[points]) & np.isnan(answer.values))
-            self.values.flat[points], self.rough.flat[points] = answer.values, far
-            surprising |= far & self.is_finest
         return surprising
 
     def _beside_others(self) -> Cells:
@@ -230,22 +172,20 @@ class _Grid:
             differ = labels[:-1] != labels[1:]
             np.moveaxis(thin, axis, 0)[1:-1] |= differ[:-1] & differ[1:]
         points = np.flatnonzero(thin)
-        cells = np.union1d(points, self._around(points, _NEAR)[0])
+        cells = np.union1d(points, self._around(points)[0])
         return cells[~self.known.flat[cells]]
 
     def _differing_near(self, points: Cells) -> Cells:
-        """Points near some points that are not known and have another label, and those beside numbers too far off."""
-        cells, which = self._around(points, _NEAR)
+        """Points near some points that are not known and have another label."""
+        cells, which = self._around(points)
         cells = cells[self.labels.flat[cells] != self.labels.flat[points[which]]]
-        if self.rough is not None:
-            cells = np.append(cells, self._around(points[self.rough.flat[points]], _BESIDES)[0])
         return np.unique(cells[~self.known.flat[cells]])
 
-    def _around(self, points: Cells, offsets: tuple[tuple[int, int], ...]) -> tuple[Cells, Cells]:
-        """Points of the lattice at some offsets from each point, and the index of that point."""
+    def _around(self, points: Cells) -> tuple[Cells, Cells]:
+        """Points of the lattice within three steps of each point, and the index of that point."""
         layer, row, column = np.unravel_index(points, self.labels.shape)
         cells, which = [], []
-        for down, right in offsets:
+        for down, right in _NEAR:
             there = row + down, column + right
             inside = (there[0] >= 0) & (there[0] < len(self.rows)) & (there[1] >= 0) & (there[1] < len(self.columns))
             place = layer[inside], there[0][inside], there[1][inside]
@@ -253,25 +193,8 @@ class _Grid:
             which.append(np.flatnonzero(inside))
         return np.concatenate(cells), np.concatenate(which)
 
-    def _interpolated(
-        self, rows: Cells, columns: Cells, row_parents: list[Cells], column_parents: list[Cells]
-    ) -> NDArray[np.float64]:
-        """Numbers of the finer lattice, linear between the points of this one."""
-        assert self.values is not None
-        values = self.values
-        for axis, fine, coarse, (low, high) in (
-            (1, rows, self.rows, row_parents),
-            (2, columns, self.columns, column_parents),
-        ):
-            gap = np.maximum(coarse[high] - coarse[low], 1)
-            weight = ((fine - coarse[low]) / gap).reshape((-1, 1) if axis == 1 else (-1,))
-            before, after = np.take(values, low, axis), np.take(values, high, axis)
-            # Where both are equal a weight must not make NaN of them or change their bits.
-            values = np.where(weight == 0.0, before, before + weight * (after - before))
-        return values
 
-
-def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generator[Cells, Answer, Decided]:
+def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Decided:
     """Compute a sample of the inferred cells, follow what was wrong, and state how much may still be wrong.
 
     One sample is drawn, before anything is known of it, so the bound holds for the labels of that moment. From then on
@@ -281,33 +204,25 @@ def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generato
     before = grid.labels.copy()
     count = min(len(inferred), math.ceil(share * len(inferred)))
     sample = np.sort(random.choice(inferred, count, replace=False))
-    surprising = yield from grid.compute(sample)
+    surprising = grid.compute(sample)
     wrong = _differ(grid.labels.flat[sample], before.flat[sample])
     blocks = _Blocks(grid)
-    far = None if grid.rough is None else grid.rough.flat[sample].copy()
     found = sample[surprising]
-    yield from grid.follow(grid._differing_near(found))
+    grid.follow(grid._differing_near(found))
     while len(found):
         opened = blocks.reopened(found)
-        surprising = yield from grid.compute(opened)
+        surprising = grid.compute(opened)
         found = opened[surprising]
-        yield from grid.follow(grid._differing_near(found))
+        grid.follow(grid._differing_near(found))
     followed = inferred[grid.known.flat[inferred]]
     corrected = int(_differ(grid.labels.flat[followed], before.flat[followed]).sum())
     origin = np.where(grid.known, np.int8(COMPUTED), np.int8(INFERRED))
     origin.flat[sample] = AUDITED
     left = len(inferred) - len(followed)
-
-    def bound(drawn: int, found: int) -> float:
-        most = largest_number(len(inferred), count, drawn) - found
-        return min(max(most, 0), left) / left if left else 0.0
-
-    findings = Findings(count, int(wrong.sum()), corrected, bound(int(wrong.sum()), corrected))
-    if far is not None and grid.rough is not None:
-        all_far = bound(int(far.sum()), int(grid.rough.flat[followed].sum()))
-        findings = replace(findings, far=int(far.sum()), far_bound=all_far)
+    most = largest_number(len(inferred), count, int(wrong.sum())) - corrected
+    bound = min(max(most, 0), left) / left if left else 0.0
     labels = np.where(grid.labels < 0, ~grid.labels, grid.labels)
-    return Decided(labels, origin, grid.level, grid.values, findings)
+    return Decided(labels, origin, grid.level, Findings(count, int(wrong.sum()), corrected, bound))
 
 
 class _Blocks:

@@ -27,8 +27,8 @@ from ringsweep.storage.provenance import fingerprint, identity
 # Bytes of this process without cells, and for each cell of the grid; from benchmarks/results/sizes.md.
 _PROCESS, _BOOKKEEPING = 300e6, 33.0
 
-# Bytes for each cell of the picture, which has no more pixels than that; for each cell if numbers are interpolated.
-_PICTURE, _MOST_DRAWN, _INTERPOLATING = 120.0, 1 << 20, 40.0
+# Bytes for each cell of the picture, which has no more pixels than that.
+_PICTURE, _MOST_DRAWN = 120.0, 1 << 20
 
 # Bytes of a finished file without cells, and the share of its columns that compression leaves: 0.55 of some thousand
 # cells, 0.4 of millions.
@@ -68,9 +68,8 @@ def check_room(plan: Grid, cells: int, folder: Path | None) -> None:
 
 def memory_needed(plan: Grid, in_memory: bool) -> float:
     """Bytes of memory that a sweep takes at most."""
-    total, refine = plan.grid.total, plan.config.refine
-    interpolates = refine is not None and refine.also is not None
-    each = _BOOKKEEPING + _INTERPOLATING * interpolates + (2.0 * plan.bytes_of_cell() if in_memory else 0.0)
+    total = plan.grid.total
+    each = _BOOKKEEPING + (2.0 * plan.bytes_of_cell() if in_memory else 0.0)
     return _PROCESS + total * each + min(total, _MOST_DRAWN) * _PICTURE
 
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.refine import Refinement
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED, LABELS, MISSING, OUTCOMES
-from ringsweep.runs.decisions import Answer, Decided, Findings, refine
+from ringsweep.runs.decisions import Decided, Findings, Run, refine
 from ringsweep.runs.grid import Chunk, Columns, Grid
 from ringsweep.storage.checkpoint import Checkpoint
 
@@ -39,72 +38,65 @@ class Refined(Grid):
 
     def compute(self, work: Work) -> None:
         """Compute the cells that decisions ask for."""
-        total, also = self.layout.total, self.asked.also
-        known, certain = np.zeros((2, total), dtype=bool)
-        labels = np.zeros(total, dtype=np.int16)
-        values = None if also is None else np.full(total, np.nan)
+        total = self.layout.total
+        known, labels = np.zeros(total, dtype=bool), np.zeros(total, dtype=np.int16)
 
         def put(positions: NDArray[np.integer], columns: Columns) -> None:
-            labels[positions] = 0
+            own = np.zeros(len(positions), dtype=np.int16)
             for k, name in enumerate(LABELS):
                 if name in columns:
-                    labels[positions] += columns[name].astype(np.int16) * np.int16(_FLAGS**k)
+                    own += columns[name].astype(np.int16) * np.int16(_FLAGS**k)
             # Without certificates no cell is certified, and that says nothing.
-            certain[positions] = (columns["certified"] == 1) | (not self.config.certifies)
-            if values is not None:
-                values[positions] = columns[also]
-            known[positions] = True
+            certain = (columns["certified"] == 1) | (not self.config.certifies)
+            labels[positions], known[positions] = np.where(certain, own, ~own), True
 
         for positions, columns in work.store.finished():
             put(positions, dict(columns))
         # Which cells an earlier sweep must give is known at the end: until then its labels are enough.
         if self.earlier is not None:
-            names = [*LABELS, "certified", also]
+            names = [*LABELS, "certified"]
             for positions, columns in self.earlier.shared_cells(self.config, self.layout, known, names):
                 put(positions, columns)
         work.notice = put
 
-        def answer(positions: NDArray[np.intp]) -> Answer:
+        def run(positions: NDArray[np.intp]) -> NDArray[np.int16]:
             missing = np.sort(positions[~known[positions]])
             if len(missing):
                 work.run(missing[:, None])
                 if not known[missing].all():
                     raise KeyboardInterrupt
-            return Answer(labels[positions], certain[positions], None if values is None else values[positions])
+            return labels[positions]
 
         with work.begun(None):
-            self._decided = self._decide(answer)
+            self._decided = self._decide(run)
         if self.earlier is not None:
             needed = np.zeros(total, dtype=bool)
             needed[self.layout.positions(np.nonzero(self._decided.origin != INFERRED))] = True
             work.take_shared(work.store.done | ~needed)
 
-    def _decide(self, answer: Callable[[NDArray[np.intp]], Answer]) -> Decided:
+    def _decide(self, run: Run) -> Decided:
         """Run the cells of a refined sweep, round after round; arrays of the result have the shape of the grid.
 
-        Decisions follow from labels alone, so a sweep that was stopped takes the same decisions again. `answer` runs
-        the cells at some positions.
+        Decisions follow from labels alone, so a sweep that was stopped takes the same decisions again. `run` takes
+        positions in the layout.
         """
         asked, sizes = self.asked, self.config.axes.sizes
         dims = [*(dim for dim in sizes if dim not in asked.dims), *asked.dims]
         grid = tuple(sizes[dim] for dim in dims)
         rows, columns = [*(sizes[dim] for dim in asked.dims), 1][:2]
         layers = math.prod(grid[: len(grid) - len(asked.dims)])
-        decisions = refine((layers, rows, columns), asked.stride, asked.audit, within=asked.within, seed=SEED)
         order = [dims.index(dim) for dim in sizes]
-        try:
-            cells = next(decisions)
-            while True:
-                indices = np.unravel_index(cells, grid)
-                cells = decisions.send(answer(self.layout.positions([indices[k] for k in order])))
-        except StopIteration as end:
-            found = end.value
+
+        def run_cells(cells: NDArray[np.intp]) -> NDArray[np.int16]:
+            indices = np.unravel_index(cells, grid)
+            return run(self.layout.positions([indices[k] for k in order]))
+
+        found = refine((layers, rows, columns), asked.stride, asked.audit, run_cells, seed=SEED)
 
         def in_grid(array: NDArray[Any]) -> NDArray[Any]:
             return array.reshape(grid).transpose(order)
 
-        values = None if found.values is None else in_grid(found.values)
-        return Decided(in_grid(found.labels), in_grid(found.origin), in_grid(found.level), values, found.audit)
+        return Decided(in_grid(found.labels), in_grid(found.origin), in_grid(found.level), found.audit)
 
     def _complete(self, region: tuple[slice, ...], columns: Columns) -> None:
         """Fill the inferred cells of a part of the grid, and add what the refinement says of its cells.
@@ -117,8 +109,6 @@ class Refined(Grid):
         for name, column in columns.items():
             if name in LABELS:
                 column[inferred] = labels // _FLAGS ** LABELS.index(name) % _FLAGS
-            elif name == self.asked.also and decided.values is not None:
-                column[inferred] = decided.values[region][inferred]
             else:
                 column[inferred] = np.nan if column.dtype.kind == "f" else MISSING
         columns["origin"], columns["level"] = decided.origin[region], decided.level[region]
@@ -141,7 +131,7 @@ class Refined(Grid):
         """Attributes of the dataset: also what was run, and what the audit says."""
         audit, total = self._decided.audit, self._decided.origin.size
         computed = total - int(np.count_nonzero(self._decided.origin == INFERRED))
-        found = super().attributes() | {
+        return super().attributes() | {
             "cells_computed": computed,
             "audit_cells": audit.cells,
             "audit_wrong_before": audit.wrong,
@@ -149,12 +139,9 @@ class Refined(Grid):
             "audit_bound": audit.bound,
             "audit_seed": SEED,
             "audit": f"{computed} of {total} cells are run ({100 * computed / total:.3g} %), the others are inferred; "
-            + _in_words(audit, self.asked),
+            + _in_words(audit),
             "refined_dimensions": json.dumps(self.asked.dims),
         }
-        if audit.far is not None:
-            found |= {"audit_far_before": audit.far, "audit_far_bound": audit.far_bound}
-        return found
 
 
 def _with_nan(column: NDArray[Any]) -> NDArray[Any]:
@@ -164,16 +151,11 @@ def _with_nan(column: NDArray[Any]) -> NDArray[Any]:
     return floats
 
 
-def _in_words(audit: Findings, config: Refinement) -> str:
+def _in_words(audit: Findings) -> str:
     if not audit.cells:
         return "none of them is audited"
     words = f"{audit.cells} of the inferred cells are audited: {audit.wrong} had been inferred wrongly"
     if audit.wrong or audit.corrected:
         words += f", {audit.corrected} were corrected in following these"
     words += f"; of the cells still inferred at most {percent_at_most(audit.bound)} are wrong"
-    if audit.far is not None and audit.far_bound is not None:
-        words += (
-            f"; {audit.far} audited cells had lacked {config.also}, or were off by more than {config.within:g}, "
-            f"and of those still inferred at most {percent_at_most(audit.far_bound)} do or are"
-        )
     return f"{words} (at 95 % confidence)"
