@@ -19,12 +19,6 @@ from ringsweep.plots.labels import axis_label, displayed, label_axis, long_name,
 from ringsweep.quantities.flags import JAMMED, SEPARATING
 from ringsweep.quantities.variables import words
 
-# Share of a run in which differences between friction laws belong to its start.
-_LATEST = 0.1
-
-# Share of the friction force above which two laws differ.
-_DIFFERENT = 0.05
-
 # Panels in which a few outliers must not flatten the rest.
 _CLIPPED = ("epsilon", "friction_force")
 
@@ -58,14 +52,11 @@ def history(ds: xr.Dataset) -> Figure:
     The panels are those of the paper. For a ring they show angle, angular velocity, angular acceleration and normal
     reactions, with a mark where a contact separates; a strip below shows which zone lies under each contact. If the run
     goes on after that, panels below show the gaps and, as marks, the speeds of impacts. For a belt the panels show
-    displacement, velocity and friction force. Times at which the body sticks, or a contact is open, are shaded. If the
-    law has bristles and the body breaks away, a last panel shows the friction force around the first break-away.
-    Of a run with more than 40 cycles the panels show the band from the least to the greatest value in each of them or
-    of a few, and beside it the last five cycles with their shading.
+    displacement, velocity and friction force. Times at which the body sticks, or a contact is open, are shaded. Of a
+    run with more than 40 cycles the panels show the band from the least to the greatest value in each of them or of a
+    few, and beside it the last five cycles with their shading.
 
-    Several friction laws are a line each, without strip and shading. On a belt, if their friction forces differ at the
-    start, a panel shows the start for twice as long as they differ. Its time axis is logarithmic if differences end at
-    times of different orders of magnitude. A last panel shows the first break-away under each law, at the same place.
+    Several friction laws are a line each, without strip and shading.
 
     Parameters
     ----------
@@ -92,23 +83,15 @@ def history(ds: xr.Dataset) -> Figure:
     """
     ds = datasets.require_history(ds)
     panels, strip, several = datasets.panels_of(ds), datasets.zones(ds), datasets.compares_laws(ds)
-    start, breakaway, cycles = _differences(ds), _first_breakaway(ds), _cycles(ds)
-    rows, many = len(panels) + bool(strip), len(cycles) > _MANY_CYCLES
+    cycles = _cycles(ds)
+    many = len(cycles) > _MANY_CYCLES
     heights = [1.0] * len(panels) + [0.13 * len(strip)] * bool(strip)
-    heights += [1.0] * ((start is not None) + (breakaway is not None))
     width = look.figure_width()
     # Panels must be as high as their labels.
     height = min(max(0.2 * width, 13.5 * rcParams["font.size"] / 100.0), 1.9)
     figure = look.picture(width, height * sum(heights) + 0.8)
-    grid = figure.add_gridspec(len(heights), 1 + many, height_ratios=heights)
-    columns = [[figure.add_subplot(grid[k, column]) for k in range(rows)] for column in range(1 + many)]
-    details = [figure.add_subplot(grid[k, :]) for k in range(rows, len(heights))]
-    for column in columns:
-        for ax in column[1:]:
-            ax.sharex(column[0])
-        for ax in column[:-1]:
-            ax.tick_params(labelbottom=False)
-    whole = columns[0]
+    grid = figure.subplots(len(heights), 1 + many, sharex="col", squeeze=False, height_ratios=heights)
+    whole = list(grid[:, 0])
     for ax, names in zip(whole, panels, strict=False):
         if several:
             _draw_laws(ax, ds, names)
@@ -122,12 +105,8 @@ def history(ds: xr.Dataset) -> Figure:
         whole[0].set_xlim(first, last)
     if many:
         late = ds.isel(time=slice(cycles[-_LAST_CYCLES - 1], None))
-        _draw_late(columns[1], late, panels, strip, whole)
-    if start is not None:
-        _draw_start(details[0], ds, *start, whole[-1])
-    if breakaway is not None:
-        _draw_breakaway(details[-1], ds, *breakaway)
-    figure.align_ylabels([*whole, *details])
+        _draw_late(list(grid[:, 1]), late, panels, strip, whole)
+    figure.align_ylabels(whole)
     if several:
         lines = whole[0].get_legend_handles_labels()
         most = 4 if len(lines[0]) == 4 else 3
@@ -203,22 +182,6 @@ def _draw_late(
     panels[0].set_xlim(*time_limits(late))
     for ax, what in ((whole[-1], "band: least to greatest"), (panels[-1], f"the last {_LAST_CYCLES} cycles")):
         ax.set_xlabel(look.folded([axis_label(late["time"], late), what], look.width_of(whole[-1]) - look.MARGIN))
-
-
-def _draw_start(axes: Axes, ds: xr.Dataset, first: float, last: float, whole: Axes) -> None:
-    """Draw the friction force for twice as long as it differs, from the first to the last difference, at the start."""
-    time = ds["time"].values
-    until = max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))
-    _draw_laws(axes, ds.isel(time=slice(0, until)), ("friction_force",))
-    if 0.0 < first < 0.05 * last:
-        axes.set_xscale("log")
-        axes.set_xlim(left=first / 20.0)
-    # The force of one law alone would flatten the others: bristles may be far above them for a moment.
-    axes.set_ylim(whole.get_ylim())
-    texts = ["friction force just after the start", whole.get_title(loc="right")]
-    axes.set_title("", loc="right")
-    axes.set_title(look.folded(texts, 0.9 * look.width_of(axes)), fontsize=look.SMALL, loc="left")
-    axes.set_xlabel(axis_label(ds["time"], ds))
 
 
 def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain: bool = False, band: Any = None) -> None:
@@ -357,67 +320,6 @@ def _law_style(k: int) -> dict[str, Any]:
     colour, style = look.CURVE_COLOURS[k % len(look.CURVE_COLOURS)], look.CURVE_STYLES[k % len(look.CURVE_STYLES)]
     # Where lines coincide, the earlier ones show on both sides of the later ones.
     return {"color": look.on_page(colour), "linestyle": style, "linewidth": max(1.2, 3.0 - 0.6 * k)}
-
-
-def _differences(ds: xr.Dataset) -> tuple[float, float] | None:
-    """When the first and the last differences between friction laws end at the start of a run on a belt, s.
-
-    A difference between the forces ends at a time t if the forces agree from t to 2 t. There can be several: bristles
-    bend within milliseconds, and the body vibrates on them for longer. None if there are none.
-    """
-    if datasets.on_ring(ds) or not datasets.compares_laws(ds) or "friction_force" not in ds:
-        return None
-    since = ds["time"].values - ds["time"].values[0]
-    force = ds["friction_force"].transpose("friction_law", "time").values
-    spread = np.fmax.reduce(force) - np.fmin.reduce(force)
-    # Relative to the 95th percentile of the force, since the greatest may be an outlier.
-    apart = np.flatnonzero((spread > _DIFFERENT * np.nanpercentile(np.abs(force), 95)) & (since > 0.0))
-    again = np.append(apart[1:], len(since) - 1)
-    ends = since[apart[(since[again] > 2.0 * since[apart]) & (again > apart + 1)]]
-    ends = ends[ends < _LATEST * since[-1]]
-    return (float(ends[0]), float(ends[-1])) if len(ends) else None
-
-
-def _first_breakaway(ds: xr.Dataset) -> tuple[NDArray[Any], float] | None:
-    """Time of the first break-away under each law, and the time to show on both sides of it, s.
-
-    None if nothing breaks away, or if there is one law only and it has no bristles: its force falls at once.
-    """
-    if datasets.on_ring(ds) or not {"first_slip", "friction_force", "velocity"} <= set(ds.variables):
-        return None
-    if not datasets.compares_laws(ds):
-        if "deflection" not in ds or not ds["deflection"].any():
-            return None
-        ds = ds.expand_dims("friction_law")
-    time, first = ds["time"].values, ds["first_slip"].values
-    turns = []
-    for velocity, start in zip(ds["velocity"].transpose("friction_law", "time").values, first, strict=True):
-        if time[0] <= start <= time[-1]:
-            k = int(np.searchsorted(time, start))
-            back = np.flatnonzero(velocity[k:] * (np.sign(velocity[k]) or 1.0) < 0.0)
-            turns.append(time[k + back[0] if len(back) else -1] - start)
-    if not turns:
-        return None
-    # The drop of friction is over before the body turns.
-    return first, max(0.5 * min(turns), 20.0 * float(np.ptp(time)) / len(time))
-
-
-def _draw_breakaway(axes: Axes, ds: xr.Dataset, first: NDArray[Any], window: float) -> None:
-    """Draw the friction force around the first break-away under each law."""
-    time = ds["time"].values
-    force = np.atleast_2d(ds["friction_force"].transpose(..., "time").values)
-    look.small_ticks(axes)
-    one: dict[str, Any] = {"color": look.pair(0), "linewidth": 1}
-    for k, (numbers, start) in enumerate(zip(force, first, strict=True)):
-        near = np.abs(time - start) <= window
-        axes.plot(time[near] - start, numbers[near], **_law_style(k) if datasets.compares_laws(ds) else one)
-    where = " under each law" if datasets.compares_laws(ds) else f", t = {number_text(first[0], '.5g')} s"
-    text = f"friction force around the first break-away{where}"
-    axes.set_title(look.folded([text], 0.9 * look.width_of(axes)), fontsize=look.SMALL, loc="left")
-    axes.locator_params(axis="x", nbins=max(4, int(1.4 * look.width_of(axes))))
-    axes.set_xlabel("time since the break-away (s)")
-    axes.set_ylabel(_short_label(ds, "friction_force"))
-    axes.margins(x=0)
 
 
 def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
