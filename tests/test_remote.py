@@ -6,8 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
-from time import sleep
 
 import dask
 import joblib
@@ -21,7 +19,6 @@ from tiers import mostly_slow
 import ringsweep
 from benchmarks.hostile.attack import same_bits
 from ringsweep import cli
-from ringsweep.runs import dask as remote
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint
@@ -223,22 +220,6 @@ def test_wrong_options_for_dask_are_refused_in_one_line(scene, tmp_path, monkeyp
     assert problem in message
     assert message.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
-
-
-@pytest.mark.slow
-def test_workers_that_pause_for_want_of_memory_are_told_with_a_cure(monkeypatch, caplog):
-    """A worker above its limit takes no task. Here the scheduler says so of one that works a second."""
-    monkeypatch.setattr(remote, "_PAUSE", 0.05)
-    monkeypatch.setattr("distributed.Client.scheduler_info", lambda *_, **__: {"workers": {"a": {"status": "paused"}}})
-    with (
-        LocalCluster(1, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL) as alone,
-        remote.workers(alone.scheduler_address) as workers,
-        caplog.at_level("WARNING", "ringsweep"),
-    ):
-        found = list(workers.results(lambda task: sleep(1.0) or 3, iter([np.arange(3)]), int, threading.Event()))
-    assert found == [3]
-    told = [record.getMessage() for record in caplog.records if record.name == "ringsweep"]
-    assert told == [f"all workers have paused, as their memory is nearly full ({remote._CURE})"]
 
 
 @pytest.mark.slow

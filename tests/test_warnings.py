@@ -3,7 +3,6 @@
 import logging
 import subprocess
 import sys
-import threading
 import tracemalloc
 from pathlib import Path
 
@@ -16,11 +15,8 @@ import ringsweep
 from ringsweep.config import load
 from ringsweep.quantities.flags import FAILED, OSCILLATORY
 from ringsweep.report.text import in_lines
-from ringsweep.runs import cells
 from ringsweep.runs.warnings import warn_of_results
-from ringsweep.solvers.rk4 import RK4 as RK4Method
 from ringsweep.storage import netcdf
-from ringsweep.storage.chunks import Layout
 
 SCENE = load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"] | {"time": {"span": "0.5 s"}}
 FRICTION = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
@@ -249,23 +245,3 @@ def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
     assert "no bound where nearby runs diverge: 3960000 of the certified cells" in out
     # A variable has 32 MB.
     assert peak < 8e6
-
-
-def test_task_that_runs_long_is_named_with_its_coordinates(monkeypatch):
-    """Here each task does: the block ends after the line was written."""
-    named = threading.Event()
-    monkeypatch.setattr(cells, "LONG", 0.001)
-    monkeypatch.setattr(cells, "_compiled", set())
-    cells._watch_from.cache_clear()
-    run = RK4Method.run
-    monkeypatch.setattr(RK4Method, "run", lambda *arguments: named.wait(10.0) and run(*arguments))
-    said = []
-    monkeypatch.setattr(cells.logger, "info", lambda text, *of: said.append(text % of) or named.set())
-    given = load({"scene": SCENE, "solver": RK4, "sweep": {"grid": AXES | {"zone.half_angle": [0.1]}}})
-    for _ in range(2):
-        named.clear()
-        cells.compute_task(given, Layout((2, 1)), np.arange(2))
-    where = "not done after 0.001 s: drive.amplitude = 0.5 to 2, zone.half_angle = 0.1 (SI units); "
-    # The first task may compile.
-    assert said[0].startswith(where + "kernels are still compiled, or events")
-    assert said[1].startswith(where + "events")

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import logging
-import os
-from collections.abc import Callable, Hashable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import groupby
-from threading import Thread, get_ident
-from time import monotonic, perf_counter, sleep
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -31,11 +26,6 @@ from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.method import Result
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import environment, processor
-
-logger = logging.getLogger("ringsweep")
-
-#: Seconds after which a task that still runs is named; most take less than two.
-LONG = 60.0
 
 # Solvers and structures whose kernels this process has compiled.
 _compiled: set[Any] = set()
@@ -102,7 +92,7 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
     start = perf_counter()
     columns: dict[str, NDArray[Any]] = {}
     for structure, own, values in by_law(scene, axes, indices, len(positions)):
-        with readable_compile_errors(), _named_if_long(axes, indices, compiles):
+        with readable_compile_errors():
             for cells, found in _runs(config, structure, {dim: along[own] for dim, along in indices.items()}, values):
                 # A bound beyond the range of a float of 32 bits is infinite.
                 with np.errstate(over="ignore"):
@@ -206,55 +196,6 @@ def _outcomes(
     names = model.columns(structure)
     result = config.solver.run(batch(structure, values), names)
     return {name: column for name, column in _columns(names, result) if name not in model.absent}
-
-
-@contextmanager
-def _named_if_long(axes: Axes, indices: Indices, compiles: bool) -> Iterator[None]:
-    """Name the cells of a task, and say why one may be slow, if the block takes long."""
-
-    def name() -> None:
-        logger.info(
-            "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps: "
-            "solver.max_steps bounds them",
-            LONG,
-            _place(axes, indices),
-            "kernels are still compiled, or " * compiles,
-        )
-
-    _watch_from(os.getpid())
-    _under_way[get_ident()] = monotonic() + LONG, name
-    try:
-        yield
-    finally:
-        _under_way.pop(get_ident(), None)
-
-
-# Tasks that this process computes, by thread: when each is long, and what names it then.
-_under_way: dict[int, tuple[float, Callable[[], None]]] = {}
-
-
-@cache
-def _watch_from(process: int) -> None:
-    """Name each task that is long. One thread watches all tasks: a timer for each would take longer than its cells."""
-
-    def watch() -> None:
-        while True:
-            sleep(0.1 * LONG)
-            for thread, (due, name) in list(_under_way.items()):
-                if monotonic() >= due and _under_way.pop(thread, None) is not None:
-                    name()
-
-    Thread(target=watch, daemon=True).start()
-
-
-def _place(axes: Axes, indices: Indices) -> str:
-    """Values of some cells, or the ends of their ranges, in words."""
-    words = []
-    for path, (dims, column) in axes.columns.items():
-        found = np.unique(column[tuple(indices[dim] for dim in dims)])
-        ends = dict.fromkeys(one if isinstance(one, str) else f"{one:g}" for one in (found[0], found[-1]))
-        words.append(f"{path} = {' to '.join(ends)}")
-    return f"{', '.join(words)} (SI units)" if words else "the run"
 
 
 def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:

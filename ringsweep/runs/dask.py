@@ -39,9 +39,6 @@ _CURE = "a limit of memory below 1 GB is too small for a worker: dask worker ADD
 # Seconds between two counts of the workers.
 _COUNT_INTERVAL = 0.5
 
-# Seconds between two looks at workers that may have paused.
-_PAUSE = 10.0
-
 # In a worker: functions that compute tasks, by key of their sweep.
 _compute: dict[str, Callable[[Positions], Any]] = {}
 
@@ -147,13 +144,12 @@ class Workers:
                 while not self.concurrency():
                     if stopped.wait(_COUNT_INTERVAL):
                         return
-            with self._pauses_told():
-                for _, result in futures:
-                    # Tasks that the client gives up have an error in place of a result.
-                    if isinstance(result, BaseException):
-                        raise result
-                    yield learn(result)
-                    submit()
+            for _, result in futures:
+                # Tasks that the client gives up have an error in place of a result.
+                if isinstance(result, BaseException):
+                    raise result
+                yield learn(result)
+                submit()
         except KilledWorker as error:
             raise InputError("--scheduler", f"several workers died with the same cells: {_CURE}") from error
         except (Exception, asyncio.CancelledError) as error:
@@ -164,26 +160,6 @@ class Workers:
         finally:
             if self.is_connected():
                 _leave(lambda: self.client.unregister_worker_plugin(plugin.name))
-
-    @contextmanager
-    def _pauses_told(self) -> Iterator[None]:
-        """Say once if all workers pause within the block: they wait for memory that may never be free."""
-        ended = Event()
-
-        def watch() -> None:
-            while not ended.wait(_PAUSE):
-                # A scheduler that is lost is told elsewhere.
-                with suppress(Exception, asyncio.CancelledError):
-                    found = self.client.scheduler_info()["workers"].values()
-                    if found and all(one["status"] == "paused" for one in found):
-                        logger.warning("all workers have paused, as their memory is nearly full (%s)", _CURE)
-                        return
-
-        Thread(target=watch, daemon=True).start()
-        try:
-            yield
-        finally:
-            ended.set()
 
     def is_connected(self) -> bool:
         """Whether the client has not lost its scheduler."""
