@@ -49,7 +49,6 @@ class Grid:
     Attributes
     ----------
     config : Config
-        The sweep, with its axes aligned to those of the earlier one.
     earlier : EarlierSweep, optional
     grid, layout : Layout
         Order of the cells, and of what tasks compute: the cells, or parts of them.
@@ -73,10 +72,9 @@ class Grid:
     def __init__(self, config: Config, asked: Any, reuse: str | os.PathLike[str] | None, whole: bool):
         if reuse is not None and self.takes_none:
             raise InputError("--reuse", self.takes_none)
-        self.asked, self.side_by_side = asked, config.solver.side_by_side
+        self.config, self.asked, self.side_by_side = config, asked, config.solver.side_by_side
         self.earlier = None if reuse is None else EarlierSweep(reuse, config)
-        self.config = config if self.earlier is None else self.earlier.align_axes(config)
-        sizes, section = tuple(self.config.axes.sizes.values()), config.scene.structure.section
+        sizes, section = tuple(config.axes.sizes.values()), config.scene.structure.section
         self.grid = self.layout = Layout(sizes, sizes if whole else None, 1 if section is None else section.keep)
 
     def bytes_of_cell(self) -> int:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterator, Mapping
-from copy import deepcopy
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,9 +20,6 @@ from ringsweep.quantities.variables import INFERRED, OUTCOMES
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import differences, fingerprint, identity
-
-# Two spacings of one axis differ by rounding, at most by this relative difference.
-_ROUNDING = 8 * np.finfo(float).eps
 
 
 class EarlierSweep:
@@ -84,22 +79,6 @@ class EarlierSweep:
             return {name: text for name, text in known if name not in ignored and not name.startswith("sweep")}
 
         return differences(fixed(self.config), fixed(config))
-
-    def align_axes(self, config: Config) -> Config:
-        """The new sweep, with the values of the earlier sweep where its own values differ by rounding only."""
-        columns, sweep = dict(config.axes.columns), deepcopy(config.source.get("sweep", {}))
-        for path, (dims, column) in columns.items():
-            sections = (sweep[kind] for kind in sweep if kind != "refine")
-            section = next((section for section in sections if path in section), None)
-            if path == LAW or len(dims) > 1 or section is None:
-                continue
-            _, known = self.axes.columns.get(path, ((), np.array(self.config.scene.values.get(path, np.nan))))
-            aligned = _align(column, np.unique(known))
-            if (aligned != column).any():
-                columns[path] = dims, aligned
-                section[path] = aligned.tolist()
-        source = config.source | {"sweep": sweep} if sweep else config.source
-        return replace(config, axes=replace(config.axes, columns=columns), source=source)
 
     def shared_cells(
         self, config: Config, layout: Layout, done: NDArray[np.bool_], names: Collection[str] | None = None
@@ -174,11 +153,3 @@ def _in_cells(data: xr.DataArray, indices: Indices, count: int) -> NDArray[Any]:
     """Values of a variable in cells; it may have further dimensions. Without indices all cells have one value."""
     found = data.transpose(*indices, ...).values[tuple(indices.values())]
     return np.broadcast_to(found, (count, *found.shape[bool(indices) :]))
-
-
-def _align(column: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values, each replaced by the known value from which it differs by rounding only, if there is one."""
-    after = np.clip(np.searchsorted(known, column), 1, max(len(known) - 1, 1))
-    candidates = known[np.stack([after - 1, np.minimum(after, len(known) - 1)])]
-    nearest = np.where(np.abs(candidates[0] - column) <= np.abs(candidates[1] - column), *candidates)
-    return np.where(np.abs(nearest - column) <= _ROUNDING * np.abs(column), nearest, column)
