@@ -76,7 +76,10 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     True
     """
     tolerance = quantity(tolerance, _TOLERANCE, "tolerance")
-    configuration = _checked_configuration(ds, regime, jobs)
+    label, _, _ = _checked(ds, regime)
+    configuration = load(configuration_of(ds))
+    check_word(regime, configuration.scene, configuration.axes.columns)
+    _check_cells(ds, label, configuration, jobs)
     found = located(ds, regime, configuration, tolerance, jobs=jobs)
     if not found.sizes["vertex"]:
         logger.warning("no boundary of %s: no two neighbouring certified cells differ in it", regime)
@@ -272,15 +275,6 @@ def _values(coordinate: xr.DataArray, dims: list[str], cells: NDArray[np.intp]) 
     """Values of a coordinate in cells that are given by their indices."""
     index = tuple(cells[:, dims.index(str(dim))] for dim in coordinate.dims)
     return np.array(np.broadcast_to(coordinate.values[index], len(cells)))
-
-
-def _checked_configuration(ds: xr.Dataset, regime: str, jobs: int | None) -> Config:
-    """Configuration of a map. Refuses a regime that it cannot have, and cells that are not those of its runs."""
-    label, _, _ = _checked(ds, regime)
-    config = load(configuration_of(ds))
-    check_word(regime, config.scene, config.axes.columns)
-    _check_cells(ds, label, config, jobs)
-    return config
 
 
 def run_points(config: Config, values: Mapping[str, NDArray[Any]], jobs: int | None) -> xr.Dataset:

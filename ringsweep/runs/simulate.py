@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Config, with_values
@@ -28,6 +27,9 @@ from ringsweep.storage.provenance import attributes
 
 #: Approximate number of instants of a history.
 SAMPLES = 20_000
+
+# Variables of impacts, and what the method calls them.
+_IMPACTS = {"impact_time": "time", "impact_contact": "contact", "impact_speed": "speed", "impulse": "impulse"}
 
 
 def simulate(
@@ -86,21 +88,13 @@ def simulate(
     >>> run.x.max().round(6).item()
     0.74574
     """
-    return history(_single_run(scene, set or {}, solver), samples=samples)
-
-
-def _single_run(
-    scene: str | os.PathLike[str] | Mapping[str, Any],
-    changed: Mapping[str, Any],
-    solver: str | Mapping[str, Any] | None,
-) -> Config:
-    """Configuration of a single run from a scene or a whole configuration."""
     if isinstance(scene, xr.Dataset):
         cure = "ds.ringsweep.simulate(drive_amplitude=2) runs a cell of it, ringsweep.plots.cell names the cell"
         raise InputError("scene", f"a configuration is expected, got a dataset: {cure}")
     if isinstance(scene, Mapping) and "scene" not in scene:
         scene = {"scene": scene}
-    return with_values(scene, changed.items(), {"method": solver} if isinstance(solver, str) else solver)
+    method = {"method": solver} if isinstance(solver, str) else solver
+    return history(with_values(scene, (set or {}).items(), method), samples=samples)
 
 
 def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
@@ -143,7 +137,10 @@ def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Datas
         # An event stands in all rows until the next one; number 0 is none.
         numbers, first = np.unique(of_rows["number"], return_index=True)
         found = {name: column[first[numbers > 0]] for name, column in of_rows.items()}
-        impacts = _impacts(found)
+        hits = found["event"] > 1
+        for name, column in _IMPACTS.items():
+            about = IMPACTS[name]
+            impacts[name] = "impact", found[column][hits].astype(about.dtype), about.attributes
         for number, kind in EVENTS.items():
             own = found["event"] == number
             told.append(Events(kind, found["time"][own], found["contact"][own].astype(np.int8)))
@@ -171,16 +168,6 @@ def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Datas
     return run, told
 
 
-def _impacts(events: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
-    """Impacts of a run as variables of its history."""
-    hits = events["event"] > 1
-    columns = {"impact_time": "time", "impact_contact": "contact", "impact_speed": "speed", "impulse": "impulse"}
-    return {
-        name: ("impact", events[column][hits].astype(IMPACTS[name].dtype), IMPACTS[name].attributes)
-        for name, column in columns.items()
-    }
-
-
 # A last normal reaction above this share of the largest of the run means that the reaction jumped to zero.
 _JUMP = 1e-6
 
@@ -199,13 +186,6 @@ def _open_contact_at_end(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
     return xr.concat([run, after], "time", data_vars="all", combine_attrs="override")
 
 
-def _counted(outcome: xr.Dataset) -> str:
-    """How often contacts are lost, and how often they hit the ring."""
-    lost, hits = int(outcome["separations"]), int(outcome["impacts"])
-    losses = f"{lost} losses of contact" if lost != 1 else "1 loss of contact"
-    return f"{losses} and {hits} impacts" if hits != 1 else f"{losses} and 1 impact"
-
-
 def _describe(outcome: xr.Dataset) -> str:
     """Outcome of a run in words."""
     regime = REGIMES[int(outcome["regime"])]
@@ -214,7 +194,9 @@ def _describe(outcome: xr.Dataset) -> str:
         contact = ("no contact", "contact 1", "contact 2", "both contacts")[int(outcome["separating_contact"])]
         after = ""
         if "aftermath" in outcome:
-            after = f", then {AFTERMATHS[int(outcome['aftermath'])]}, with {_counted(outcome)}"
+            lost, hits = int(outcome["separations"]), int(outcome["impacts"])
+            counted = f"{lost} loss{'es' * (lost != 1)} of contact and {hits} impact{'s' * (hits != 1)}"
+            after = f", then {AFTERMATHS[int(outcome['aftermath'])]}, with {counted}"
         return (
             f"{regime} ({REGIMES[int(outcome['motion'])]}), {contact}, "
             f"t = {float(outcome['t_separation']):.6g} s{after}{certificate}"

@@ -67,7 +67,11 @@ def warn_of_results(results: xr.Dataset, config: Config, *, counted: bool = Fals
             unsettled += int(np.count_nonzero((settled == 0) & ~np.isin(regime, _ENDED)))
     # Of a sweep with sections one looks at these.
     if size >= _MAP and np.count_nonzero(cells) == 1 and "section" not in results.dims and not counted:
-        _hint_at_one_word(REGIMES[int(cells.argmax())], size, config)
+        zones = any(structure.arcs for structure in config.scene.structures.values())
+        where = ", does a contact meet the zone (zone.center counts from the bottom of the ring)" * zones
+        why = "do the axes reach far enough, is the span long enough"
+        regime = REGIMES[int(cells.argmax())]
+        logger.info("all %d cells are %s: %s%s? ringsweep simulate shows one run", size, regime, why, where)
     if unstable:
         if np.isfinite(largest):
             steps = config.solver.steps * largest / STABILITY_LIMIT
@@ -123,18 +127,6 @@ def _hint_at_a_torus(results: xr.Dataset, config: Config) -> str:
     )
 
 
-def _hint_at_one_word(regime: str, size: int, config: Config) -> None:
-    """Say what to look at where one word fills a map: its axes may not reach what decides."""
-    zones = any(structure.arcs for structure in config.scene.structures.values())
-    logger.info(
-        "all %d cells are %s: do the axes reach far enough, is the span long enough%s? "
-        "ringsweep simulate shows one run",
-        size,
-        regime,
-        ", does a contact meet the zone (zone.center counts from the bottom of the ring)" if zones else "",
-    )
-
-
 def _warn_of_failures(results: xr.Dataset, config: Config, failed: NDArray[np.intp]) -> None:
     """Name the first run that failed, and say why; `failed` are positions of such runs."""
     regime = results.variables["regime"]
@@ -171,23 +163,16 @@ def _value(axis: xr.DataArray) -> str:
 def _hint_at_idle_axes(results: xr.Dataset) -> None:
     """Say which axes change no number of any cell."""
     columns = [results.variables[name] for name in results.data_vars if name != "steps"]
+
+    def is_idle(column: xr.Variable, dim: str) -> bool:
+        first = np.broadcast_to(column.isel({dim: [0]}).values, column.shape)
+        return np.array_equal(column.values, first, equal_nan=column.dtype.kind == "f")
+
     for dim in map(str, results["regime"].dims):
-        if "origin" in results or results.sizes[dim] < _ALONG or not all(_is_idle(one, dim) for one in columns):
+        if "origin" in results or results.sizes[dim] < _ALONG or not all(is_idle(one, dim) for one in columns):
             continue
         why = ": no contact meets an edge of the zone, or friction is alike on both sides" if "zone" in dim else ""
         logger.info("no number depends on %s%s", dim, why)
-
-
-def _is_idle(column: xr.Variable, dim: str) -> bool:
-    """Whether each value is the first one along a dimension."""
-    for _, _, region in Layout(column.shape).chunks():
-        values = column[region].values
-        first = column[
-            tuple(slice(0, 1) if name == dim else part for name, part in zip(column.dims, region, strict=True))
-        ]
-        if not ((values == first.values) | (values != values) & (first.values != first.values)).all():
-            return False
-    return True
 
 
 def warn_of_sample(results: xr.Dataset, config: Config) -> None:
