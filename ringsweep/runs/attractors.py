@@ -89,9 +89,10 @@ def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
     if not tolerance > 0.0:
         raise InputError("tolerance", f"{tolerance!r} is not greater than 0")
     dims = tuple(str(dim) for dim in ds[place].dims if dim != "section")
+    ds = ds.transpose(*dims, ..., missing_dims="ignore")
     shape = tuple(ds.sizes[dim] for dim in dims)
-    named = {name: _by_cell(ds, name, dims) for name in ("regime", "long_run") if name in ds}
-    motions = list(_motions(ds, dims, named, tolerance))
+    named = {name: words(ds[name]).values.astype(str).ravel() for name in ("regime", "long_run") if name in ds}
+    motions = list(_motions(ds, named, tolerance))
     labels = np.zeros(len(motions), dtype=np.int64)
     known: list[_Motion] = []
     for cell, motion in enumerate(motions):
@@ -106,7 +107,11 @@ def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
     rank = np.zeros(len(counts), dtype=np.int64)
     rank[order] = np.arange(1, len(counts))
     labels = rank[labels]
-    names = [NONE, *_names(labels, named.get("regime"), len(known))]
+    names = [NONE]
+    for k in range(1, len(known) + 1):
+        # The most frequent regime of its cells.
+        own, often = np.unique(named["regime"][labels == k] if "regime" in named else ["motion"], return_counts=True)
+        names.append(f"{own[often.argmax()]}_{k}")
     share = np.bincount(labels, minlength=len(names)) / max(len(labels), 1)
     errors = _errors(labels.reshape(shape), share, dims == ("point",) or len(dims) == 0)
     attributes = {"long_name": "motion on which the cell ends", "units": "1", "flag_meanings": " ".join(names)}
@@ -125,23 +130,17 @@ def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
     )
 
 
-def _by_cell(ds: xr.Dataset, name: str, dims: tuple[str, ...]) -> NDArray[np.str_]:
-    return np.asarray(words(ds[name]).transpose(*dims).values).astype(str).ravel()
-
-
-def _motions(
-    ds: xr.Dataset, dims: tuple[str, ...], named: dict[str, NDArray[np.str_]], tolerance: float
-) -> Iterator[_Motion | None]:
+def _motions(ds: xr.Dataset, named: dict[str, NDArray[np.str_]], tolerance: float) -> Iterator[_Motion | None]:
     """The motion of each cell; None if it ends on none."""
     variables = [name for name in POINTS if name in ds and bool(ds[name].notnull().any())]
-    points = np.stack([ds[name].transpose(*dims, "section").values for name in variables], axis=-1)
+    points = np.stack([ds[name].values for name in variables], axis=-1)
     points = points.reshape(-1, *points.shape[-2:])
     ends = np.full((len(points), len(variables)), np.nan)
     for k, name in enumerate(variables):
         # The end of a run stands for a motion that is a point.
         state = name.replace("_section", "_end")
         if state in ds:
-            ends[:, k] = ds[state].transpose(*dims).values.ravel()
+            ends[:, k] = ds[state].values.ravel()
     if "phi_section" in variables:
         # An angle is a point of a circle.
         variables.append("phi_section")
@@ -153,7 +152,7 @@ def _motions(
     long_run = named.get("long_run", np.full(len(points), ""))
     lost = np.isin(regime, _ENDED) | np.isin(long_run, _NONE)
     if "long_run" not in named and "settled" in ds:
-        lost |= ds["settled"].transpose(*dims).values.ravel() != 1
+        lost |= ds["settled"].values.ravel() != 1
     still = np.isin(long_run, _STILL) | (np.isin(regime, _STEADY) & (long_run != "periodic"))
     seen = np.concatenate([points[~lost & ~still].reshape(-1, len(variables)), ends[~lost & still]])
     seen = seen[np.isfinite(seen[:, :2]).all(axis=1)]
@@ -165,7 +164,7 @@ def _motions(
     within = np.full(len(variables), tolerance)
     travel = np.zeros(len(points))
     if "x_min" in ds and "x_max" in ds:
-        travel = (ds["x_max"] - ds["x_min"]).transpose(*dims).values.ravel()
+        travel = (ds["x_max"] - ds["x_min"]).values.ravel()
     for cell in range(len(points)):
         kept = points[cell][np.isfinite(points[cell][:, :2]).all(axis=1)]
         if lost[cell]:
@@ -207,17 +206,6 @@ def _spacing(points: Floats) -> float:
     distance = np.abs(points[:, None] - points[None]).max(axis=2)
     np.fill_diagonal(distance, np.inf)
     return float(np.median(distance.min(axis=1)))
-
-
-def _names(labels: NDArray[np.int64], regime: NDArray[np.str_] | None, count: int) -> list[str]:
-    """Names of the motions: the most frequent regime of their cells, and a number."""
-    if regime is None:
-        return [f"motion_{k}" for k in range(1, count + 1)]
-    found = []
-    for k in range(1, count + 1):
-        own, often = np.unique(regime[labels == k], return_counts=True)
-        found.append(f"{own[often.argmax()]}_{k}")
-    return found
 
 
 def _errors(labels: NDArray[np.int64], share: Floats, independent: bool) -> Floats:
