@@ -105,11 +105,10 @@ def report(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
 def _words(ds: xr.Dataset) -> list[str]:
     """The regimes that occur, the most frequent first."""
     if is_sampled(ds):
-        share = ds["probability"].mean([dim for dim in ds["probability"].dims if dim != "word"])
-        order = np.argsort(-share.values, kind="stable")
-        return [str(share["word"].values[k]) for k in order if share.values[k] > 0.0]
-    found, counts = np.unique(words(ds["regime"]).values, return_counts=True)
-    return list(map(str, found[np.argsort(-counts, kind="stable")]))
+        share = {str(word): float(ds["probability"].sel(word=word).mean()) for word in ds["word"].values}
+    else:
+        share = dict(zip(*np.unique(words(ds["regime"]).values, return_counts=True), strict=True))
+    return sorted((word for word in share if share[word] > 0.0), key=lambda word: -share[word])
 
 
 def _thresholds(ds: xr.Dataset, configuration: dict[str, Any], occurring: list[str]) -> list[str]:
@@ -127,21 +126,21 @@ def _thresholds(ds: xr.Dataset, configuration: dict[str, Any], occurring: list[s
         return [f"every run is {occurring[0]}: no regime begins or ends in this map"]
     if (configuration.get("sweep") or {}).get("follow"):
         return ["cells follow each other, so a threshold depends on the cells before"]
-    config = nominal(ds).source if is_sampled(ds) else configuration
-    fixed = ["what is uncertain has its median"] if is_sampled(ds) else []
+    config, fixed = configuration, list[str]()
+    if is_sampled(ds):
+        config, fixed = nominal(ds).source, ["what is uncertain has its median"]
     # A scene need not have a value for what is swept: then the one in the middle is taken.
-    middle = {path: one.values.flat[one.size // 2].item() for path, one in axes.items()}
-    missing = {path: value for path, value in middle.items() if written(config, path) is None}
+    own = {path: written(config, path) for path in axes}
+    at = {path: one.values.flat[one.size // 2].item() if own[path] is None else own[path] for path, one in axes.items()}
     left_out = next((word for word in occurring if word not in ("separating", "jammed")), occurring[0])
     lines = []
     for path in axes:
-        others = {other: missing.get(other, written(config, other)) for other in axes if other != path}
+        others = {other: value for other, value in at.items() if other != path}
         given = [f"{other} = {value}" for other, value in others.items()]
         lines.append(f"{', '.join([f'along {path}', *fixed, *given])}:")
-        settings = {other: value for other, value in others.items() if other in missing}
         for regime in (word for word in occurring if word != left_out):
             try:
-                found = threshold(config, path, regime, set=settings)
+                found = threshold(config, path, regime, set=others)
             except InputError as error:
                 lines.append(f"  {regime}: {error}")
             else:

@@ -64,7 +64,12 @@ def summary(result: xr.Dataset) -> dict[str, list[str]]:
     found = {"regimes": [f"cells: {regime.size}", *_shares(result, "regime")]}
     if "aftermath" in result:
         found["aftermath"] = ["contacts:", *_shares(result, "aftermath"), *_losses(result)]
-    if extremes := [extreme for name in _GREATEST if name in result and (extreme := _extreme(result, name))]:
+    extremes = []
+    for name in (name for name in _GREATEST if name in result):
+        largest = np.fmax.reduce([np.fmax.reduce(part, axis=None) for (part,) in parts(result, name)])
+        if not np.isnan(largest):
+            extremes.append(f"{name} {largest:.3g} {result[name].attrs.get('units', '')}")
+    if extremes:
         found["shocks"] = [f"greatest: {', '.join(extremes)}"]
     lines = found["certificates"] = []
     if "certified" in result:
@@ -84,19 +89,18 @@ def summary(result: xr.Dataset) -> dict[str, list[str]]:
             )
     if "audit" in result.attrs:
         lines.append(f"refined: {result.attrs['audit']}")
-        if "certified" in result and 2 * run > regime.size:
-            lines.append("refining saves little here: a run without it has the numbers of all cells")
-    bounds = []
+    bounds, diverging = [], 0
     for name in (str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")):
-        known = np.concatenate([part[np.isfinite(part)] for (part,) in parts(result, f"{name}_error")])
-        if known.size:
+        finite = []
+        for bound, certified in parts(result, f"{name}_error", "certified"):
+            finite.append(bound[np.isfinite(bound)])
+            if name in ("phi_end", "x_end"):
+                diverging += int(np.sum((certified == 1) & np.isnan(bound)))
+        if (known := np.concatenate(finite)).size:
             unit = result[name].attrs.get("units", "")
             bounds.append(f"  {name}: {np.median(known):.1e}, {known.max():.1e} {unit}".rstrip())
     lines += ["bounds on errors (median, largest):", *bounds] if bounds else []
-    for name in {"phi_end_error", "x_end_error"} & set(result):
-        both = parts(result, "certified", name)
-        if unbounded := sum(np.count_nonzero((certified == 1) & np.isnan(bound)) for certified, bound in both):
-            lines.append(f"no bound where nearby runs diverge: {unbounded} of the certified cells")
+    lines += [f"no bound where nearby runs diverge: {diverging} of the certified cells"] if diverging else []
     return found
 
 
@@ -107,12 +111,6 @@ def _share_at_most(share: float) -> str:
 
 # What loads or shakes the body most, over all cells.
 _GREATEST = ("jump_max", "normal_max_1", "normal_max_2", "gap_max", "impact_speed_max", "impulse_max")
-
-
-def _extreme(result: xr.Dataset, name: str) -> str:
-    """Name and largest value of a variable; nothing if all are missing."""
-    largest = float(np.fmax.reduce([np.fmax.reduce(part, axis=None) for (part,) in parts(result, name)]))
-    return "" if np.isnan(largest) else f"{name} {largest:.3g} {result[name].attrs.get('units', '')}"
 
 
 def _counts(result: xr.Dataset, variable: str) -> list[tuple[int, str, int]]:
@@ -134,24 +132,22 @@ def _losses(result: xr.Dataset) -> list[str]:
     """How often the contacts of a run are lost, and how often they hit the ring."""
     told = []
     for name, what in (("separations", "losses of contact"), ("impacts", "impacts")):
-        if name not in result:
-            continue
         # Inferred cells have no number; cells that lose no contact have no losses.
-        counts = np.concatenate([part[part > 0] for (part,) in parts(result, name)])
-        if counts.size:
-            ends = f"{counts.min():.0f} to {counts.max():.0f}, median {np.median(counts):.0f}"
-            told.append(f"{what} {counts[0]:.0f}" if result["regime"].size == 1 else f"{what} {ends}")
-    several = "in a run that has any" if result["regime"].size > 1 else "in this run"
-    return [f"  {several}: {'; '.join(told)}"] if told else []
+        counts = np.concatenate([part[part > 0] for (part,) in parts(result, name)]) if name in result else np.empty(0)
+        if counts.size == 1:
+            told.append(f"{what} {counts[0]:.0f}")
+        elif counts.size:
+            told.append(f"{what} {counts.min():.0f} to {counts.max():.0f}, median {np.median(counts):.0f}")
+    return [f"  in a run that has any: {'; '.join(told)}"] if told else []
 
 
-# Events of a run that are printed: all, or the first and the last. Where contacts hit, only events of contacts are.
-_FIRST, _LAST = 8, 4
+# Most events of a run that are printed. Where contacts hit, only events of contacts are.
+_MOST_EVENTS = 12
 _OF_CONTACTS = ("separation", "rebound", "closure")
 
 
 def events_in_words(run: xr.Dataset) -> str:
-    """How many events of each kind a run has, and the first and the last of them, line by line."""
+    """How many events of each kind a run has, and the first of them, line by line."""
     if "friction_law" in run.dims:
         return "\n".join(f"{law}: {events_in_words(run.sel(friction_law=law))}" for law in run["friction_law"].values)
     kinds, contacts = words(run["event_kind"]).values, words(run["event_contact"]).values
@@ -160,15 +156,13 @@ def events_in_words(run: xr.Dataset) -> str:
     lines = [f"events: {', '.join(counts) or 'none'}"]
     hits = np.flatnonzero(np.isin(kinds, _OF_CONTACTS[1:]))
     speeds = dict(zip(hits.tolist(), run["impact_speed"].values.tolist(), strict=False)) if len(hits) else {}
-    told = np.flatnonzero(np.isin(kinds, _OF_CONTACTS) | (not speeds))
-    left_out = range(_FIRST, len(told) - _LAST)
-    for row, k in enumerate(told.tolist()):
-        if row == left_out.start and len(left_out) > 1:
-            lines.append(f"  ... {len(left_out)} more{', and the other kinds,' if speeds else ''} are in the file")
-        if row not in left_out or len(left_out) == 1:
-            who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
-            speed = f", {speeds[k]:.6g} m/s" if k in speeds else ""
-            lines.append(f"  {run['event_time'].values[k]:.9g} s {kinds[k]}{who}{speed}")
+    told = np.flatnonzero(np.isin(kinds, _OF_CONTACTS) | (not speeds)).tolist()
+    for k in told[:_MOST_EVENTS]:
+        who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
+        speed = f", {speeds[k]:.6g} m/s" if k in speeds else ""
+        lines.append(f"  {run['event_time'].values[k]:.9g} s {kinds[k]}{who}{speed}")
+    if len(told) > _MOST_EVENTS:
+        lines.append(f"  ... {len(told) - _MOST_EVENTS} more{', and the other kinds,' * bool(speeds)} are in the file")
     if speeds:
         hardest = max(speeds, key=speeds.__getitem__)
         when = run["event_time"].values[hardest]
@@ -177,23 +171,13 @@ def events_in_words(run: xr.Dataset) -> str:
     return "\n".join(lines)
 
 
-# Parameters of the greatest influence on a regime that are printed.
-_MOST_PARAMETERS = 3
-
-
 def _indices(of: xr.Dataset) -> list[str]:
     """The total indices of a regime in one cell, the greatest first, unless nothing is known of them."""
     if "sobol_total" not in of or float((of["sobol_total_high"] - of["sobol_total_low"]).min()) >= 1.0:
         return []
-    order = np.argsort(-of["sobol_total"].values)
-    told = (of.isel(parameter=k) for k in order[:_MOST_PARAMETERS].tolist())
-    parts = [
-        f"{one['parameter'].item()} {float(one['sobol_total']):.0%}"
-        f" ({float(one['sobol_total_low']):.0%} to {float(one['sobol_total_high']):.0%})"
-        for one in told
-    ]
-    if len(order) > len(parts):
-        parts.append(f"and {len(order) - len(parts)} smaller")
+    columns = [of[f"sobol_total{end}"].values for end in ("", "_low", "_high")]
+    told = sorted(zip(*columns, of["parameter"].values, strict=True), key=lambda one: -one[0])
+    parts = [f"{name} {index:.0%} ({low:.0%} to {high:.0%})" for index, low, high, name in told]
     return [f"    total Sobol index: {', '.join(parts)}"]
 
 
@@ -205,22 +189,17 @@ def _of_sample(result: xr.Dataset) -> dict[str, list[str]]:
     lines.append(f"interval: {result.attrs.get('sample_interval')}")
     grid = [dim for dim in probability.dims if dim != "word"]
     for word in map(str, result["word"].values):
-        of = {name: result[name].sel(word=word) for name in result.data_vars if str(name).startswith("probability")}
-        if not (of["probability"] > 0.0).any():
-            continue
-        if cells == 1:
-            share, low, high, numerics = (float(column.values.squeeze()) for column in of.values())
-            part = f", of which {numerics:.2%} are numerics" if numerics > 0.0 else ""
-            lines += [f"  {word}: {share:.2%} ({low:.2%} to {high:.2%}{part})"]
-            lines += _indices(result.sel(word=word).squeeze(grid))
-            continue
-        shares = of["probability"].values
-        length = float((of["probability_high"] - of["probability_low"]).max())
-        numerics = float(of["probability_numerics"].max(grid))
-        lines.append(
-            f"  {word}: {shares.min():.2%} to {shares.max():.2%}, mean {shares.mean():.2%}; intervals up to "
-            f"{length:.2%} long{f', of which up to {numerics:.2%} are numerics' if numerics > 0.0 else ''}"
-        )
+        of = result.sel(word=word)
+        share, low, high, numerics = (of[f"probability{end}"].values for end in ("", "_low", "_high", "_numerics"))
+        part = f", of which {'up to ' * (cells > 1)}{numerics.max():.2%} are numerics" * bool(numerics.max() > 0.0)
+        if share.max() > 0.0 and cells == 1:
+            lines.append(f"  {word}: {share.item():.2%} ({low.item():.2%} to {high.item():.2%}{part})")
+            lines += _indices(of.squeeze(grid))
+        elif share.max() > 0.0:
+            lines.append(
+                f"  {word}: {share.min():.2%} to {share.max():.2%}, mean {share.mean():.2%}; "
+                f"intervals up to {(high - low).max():.2%} long{part}"
+            )
     runs = result["runs"]
-    share = float(runs.isel(certificate=1).sum() / runs.sum())
-    return {"regimes": lines, "certificates": [f"certified: {_share_at_most(share)} of {int(runs.sum())} runs"]}
+    certified = float(runs.isel(certificate=1).sum() / runs.sum())
+    return {"regimes": lines, "certificates": [f"certified: {_share_at_most(certified)} of {int(runs.sum())} runs"]}
