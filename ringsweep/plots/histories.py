@@ -108,11 +108,9 @@ def history(ds: xr.Dataset) -> Figure:
         _draw_late(list(grid[:, 1]), late, panels, strip, whole)
     figure.align_ylabels(whole)
     if several:
-        lines = whole[0].get_legend_handles_labels()
-        most = 4 if len(lines[0]) == 4 else 3
-        # A line of each entry, its label, and the space around them.
-        count = max(1, min(most, look.letters(width) // (max(map(len, lines[1])) + 11)))
-        figure.legend(*lines, loc="outside upper center", ncols=count, handlelength=4, **look.LEGEND)
+        lines = list(whole[0].get_legend_handles_labels()[0])
+        columns = look.columns_of(lines, width - look.MARGIN)
+        figure.legend(handles=lines, loc="outside upper center", ncols=columns, handlelength=4, **look.LEGEND)
     elif texts := list(filter(None, [*datasets.outcome(ds).splitlines(), "; ".join(datasets.scene_text(ds))])):
         figure.suptitle("\n".join(look.folded([text], width) for text in texts), fontsize="medium")
     return figure

@@ -181,42 +181,10 @@ def is_scattered(horizontal: Axis, vertical: Axis | None) -> bool:
     return horizontal.dims == vertical.dims or not (horizontal.is_gridded and vertical.is_gridded)
 
 
-def thinned(axes: list[Axis], most: int, data: xr.DataArray) -> dict[str, NDArray[np.intp]]:
-    """Indices by dimension that are drawn of axes with more than `most` values, in ascending order of the values.
-
-    They are every second, third, ... one. Of a classification, others of these seconds or thirds are taken where a
-    class would not be drawn at all; if that is impossible, the class is not drawn.
-    """
-    steps = {axis.dims[0]: math.ceil(len(axis.values) / most) for axis in axes}
-    orders = {axis.dims[0]: axis.order for axis in axes if steps[axis.dims[0]] > 1}
-    places = {dim: np.arange(len(order))[steps[dim] // 2 :: steps[dim]] for dim, order in orders.items()}
-    if places and "flag_values" in data.attrs:
-        _keep_classes(places, steps, data.isel(orders))
-    return {dim: orders[dim][place] for dim, place in places.items()}
-
-
-def _keep_classes(places: dict[str, NDArray[np.intp]], steps: dict[str, int], data: xr.DataArray) -> None:
-    """Shift places within their steps such that each class of `data` has a cell among them; the rarest class first."""
-    fixed = {dim: np.zeros(len(place), dtype=bool) for dim, place in places.items()}
-    values, counts = np.unique(data.values, return_counts=True)
-    for value in values[np.argsort(counts, kind="stable")]:
-        drawn = data.isel(places).values == value
-        if drawn.any():
-            cell = dict(zip(data.dims, np.unravel_index(int(drawn.argmax()), drawn.shape), strict=True))
-            for dim, fix in fixed.items():
-                fix[cell[dim]] = True
-            continue
-        cells = dict(zip(data.dims, np.nonzero(data.values == value), strict=True))
-        free = np.ones(len(cells[data.dims[0]]), dtype=bool)
-        # Behind the last whole step there may be a few more values.
-        steps_of = {dim: np.minimum(cells[dim] // steps[dim], len(place) - 1) for dim, place in places.items()}
-        for dim, place in places.items():
-            free &= ~fixed[dim][steps_of[dim]] | (place[steps_of[dim]] == cells[dim])
-        if free.any():
-            first = int(free.argmax())
-            for dim, place in places.items():
-                place[steps_of[dim][first]] = cells[dim][first]
-                fixed[dim][steps_of[dim][first]] = True
+def thinned(axes: list[Axis], most: int) -> dict[str, NDArray[np.intp]]:
+    """Indices by dimension that are drawn of axes with more than `most` values: every second, third, ... in order."""
+    steps = [math.ceil(len(axis.values) / most) for axis in axes]
+    return {axis.dims[0]: axis.order[step // 2 :: step] for axis, step in zip(axes, steps, strict=True) if step > 1}
 
 
 def as_matrix(data: xr.DataArray, horizontal: Axis, vertical: Axis | None) -> NDArray[Any]:

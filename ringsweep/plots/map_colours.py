@@ -120,15 +120,10 @@ class CellWarning:
 
 
 def cell_warnings(ds: xr.Dataset, data: xr.DataArray) -> list[CellWarning]:
-    """Warnings of a map of regimes, motions or aftermaths: not certified, or beyond the stability limit of ``rk4``.
-
-    A map of another variable hatches the cells without a value that were inferred, if others have none for another
-    reason.
-    """
+    """Warnings of a map of regimes, motions or aftermaths: not certified, or beyond the stability limit of ``rk4``."""
+    found: list[CellWarning] = []
     if data.name not in ("regime", "motion", "aftermath"):
-        apart = inferred_apart(ds, data)
-        return [CellWarning(_NOT_RUN, "//////", "x", apart)] if apart.any() else []
-    found = []
+        return found
     if "certified" in ds:
         cells = (ds["certified"] == 0).broadcast_like(data)
         everywhere = bool(cells.any() and not (ds["certified"] == 1).any())
@@ -155,28 +150,9 @@ def missing_text(ds: xr.Dataset, data: xr.DataArray) -> str:
     ended_early = "regime" in ds and bool((missing & ds["regime"].isin([JAMMED, FAILED])).any())
     if name in _EVENTS and not ended_early and (span := _span(ds)):
         text += f"\nwithin {span}"
-    inferred = _missing_inferred(ds, data)
-    if inferred.any() and not inferred_apart(ds, data).any():
-        text = _NOT_RUN if inferred.equals(missing) else f"{text}, or\n{_NOT_RUN}"
+    if "origin" in ds and (missing & (inferred := ds["origin"] == INFERRED)).any():
+        text = f"{text}, or\n" * bool((missing & ~inferred).any()) + "inferred, not run"
     return text
-
-
-_NOT_RUN = "inferred, not run"
-
-
-def _missing_inferred(ds: xr.Dataset, data: xr.DataArray) -> xr.DataArray:
-    """Cells without a value that were inferred."""
-    missing = data.isnull()
-    return missing & (ds["origin"] == INFERRED) if "origin" in ds else missing & False
-
-
-def inferred_apart(ds: xr.Dataset, data: xr.DataArray) -> xr.DataArray:
-    """Missing cells that were not run, if a map tells them from others that are missing; else none.
-
-    A line cannot: it has no hatching.
-    """
-    inferred = _missing_inferred(ds, data)
-    return inferred & (data.ndim > 1 and not inferred.equals(data.isnull()))
 
 
 # Events that a run may lack, and what it lacks if another variable is missing.

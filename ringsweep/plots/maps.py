@@ -62,7 +62,7 @@ def regime_map(
     The cells of a grid are coloured rectangles, points make a scatter plot. One swept quantity makes a strip (of a
     classification) or a line (of numbers). More than two dimensions make small multiples. If an axis has more values
     than a page has pixels, only every second, third, ... is drawn, and the title says so; the legend gives shares of
-    all cells. Cells of rare classes are drawn in place of neighbours if they would all be left out.
+    all cells.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ class Map:
         # A line is drawn with all its values: every peak stays visible.
         drawn = {}
         if not self.scattered and vertical:
-            drawn = thinned([horizontal, vertical], _MOST_CELLS // self.columns, data)
+            drawn = thinned([horizontal, vertical], _MOST_CELLS // self.columns)
         thin = self.ds.isel(drawn)
         self.data = labels.displayed(thin[var])
         self.horizontal, self.vertical = horizontal.within(thin), vertical.within(thin) if vertical else None
@@ -305,8 +305,7 @@ class Map:
             for k, (flag, meaning) in enumerate(zip(self.scale.flags, self.scale.meanings, strict=True)):
                 add(data.values == flag, meaning, self.scale.colours(k))
         if not shown.all():
-            other = ~shown & ~map_colours.inferred_apart(self.ds, data).values
-            add(other, map_colours.missing_text(self.ds, data), look.on_page(look.NO_VALUE))
+            add(~shown, map_colours.missing_text(self.ds, data), look.on_page(look.NO_VALUE))
         if isinstance(self.scale.norm, colors.LogNorm) and self.vertical:
             add(data.values == 0.0, "exactly 0", map_colours.ZERO)
         ink = look.on_page("black")
@@ -571,7 +570,5 @@ def _outline(cells: NDArray[Any], x: NDArray[Any], y: NDArray[Any]) -> Outline:
     row, begin = np.nonzero(steps == 1)
     end = np.nonzero(steps == -1)[1]
     left, right, low, high = x[begin], x[end], y[row], y[row + 1]
-    corners = [(left, low), (right, low), (right, high), (left, high), (left, low)]
-    vertices = np.stack([np.column_stack(corner) for corner in corners], axis=1).reshape(-1, 2)
-    codes = np.tile([Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY], len(row))
-    return Outline(vertices, codes.astype(Outline.code_type))
+    corners = np.array([(left, low), (right, low), (right, high), (left, high)])
+    return Outline.make_compound_path_from_polys(corners.transpose(2, 0, 1))

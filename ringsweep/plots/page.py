@@ -158,7 +158,7 @@ class _Sweep:
         whole = ds
         if not (vertical and is_scattered(horizontal, vertical)):
             # A picture of cells needs their values in ascending order.
-            ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG, ds[var]))
+            ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG))
             if ds[var].size < whole[var].size:
                 notes.append(f"1 cell in {whole[var].size / ds[var].size:.0f} shown; shares are those of all cells")
             axes = [axis.within(ds) for axis in axes]

@@ -95,22 +95,15 @@ def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, 
         if is_numeric(coordinate) and not np.isclose(
             coordinate.values[index], number, rtol=1e-12, atol=1e-15 * np.nanmax(np.abs(coordinate.values))
         ):
-            taken, given = _told_apart(coordinate[index], number)
+            one = coordinate[index].astype(float)
+            pairs = ((amount_text(one, digits), amount_text(one.copy(data=number), digits)) for digits in (4, 8, 17))
+            taken, given = next(pair for pair in pairs if pair[0] != pair[1])
             told = "%s: %s is not in the dataset: the nearest value is taken, %s"
             logger.warning(told, wanted, plain_text(given), plain_text(taken))
             text = f"{long_name(coordinate)} = {taken} (nearest to {given})"
         ds = ds.isel({coordinate.dims[0]: index})
         texts.append(text)
     return ds, texts
-
-
-def _told_apart(taken: xr.DataArray, asked: float) -> tuple[str, str]:
-    """Texts of the value taken and of the value asked for, with as many digits as they need to differ."""
-    for digits in range(4, 18):
-        texts = amount_text(taken, digits), amount_text(taken.astype(float).copy(data=asked), digits)
-        if texts[0] != texts[1]:
-            break
-    return texts
 
 
 def _range_of(coordinate: xr.DataArray) -> Parameter:
