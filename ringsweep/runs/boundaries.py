@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from contourpy import contour_generator
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, load
@@ -91,16 +92,16 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
     label, flag, dims = _checked(ds, regime)
     inside = ds[label].values == flag
     usable = ds["certified"].values == 1 if configuration.certifies else _was_run(ds)
-    sides = [_crossings(inside, usable, axis) for axis in range(len(dims))]
-    low = np.concatenate([one for one, _ in sides])
-    high = np.concatenate([other for _, other in sides])
-    axis = np.repeat(np.arange(len(dims)), [len(one) for one, _ in sides])
+    # Indices of neighbouring cells, both usable, of which one is inside.
+    along = [sliding_window_view(usable, 2, k).all(axis=-1) & np.diff(inside, axis=k) for k in range(len(dims))]
+    low, axis = np.concatenate(list(map(np.argwhere, along))), np.repeat(np.arange(len(dims)), list(map(np.sum, along)))
+    high = low + np.eye(len(dims), dtype=int)[axis]
     columns = {str(c.name): c for c in swept(ds)}
     place = {name: _values(c, dims, low) for name, c in columns.items()}
     ends = np.zeros((2, len(low)))
     for k, dim in enumerate(dims):
-        along = ds[dim].values
-        ends[:, axis == k] = along[low[axis == k, k]], along[high[axis == k, k]]
+        values = ds[dim].values
+        ends[:, axis == k] = values[low[axis == k, k]], values[high[axis == k, k]]
     within = inside[tuple(low.T)]
     beyond = ds[label].values[tuple(np.where(within[:, None], high, low).T)].copy()
 
@@ -261,14 +262,6 @@ def _check_cells(ds: xr.Dataset, label: str, config: Config, jobs: int | None) -
 
 def _was_run(ds: xr.Dataset) -> NDArray[np.bool_]:
     return ds["origin"].values != INFERRED if "origin" in ds else np.ones(ds["regime"].shape, dtype=bool)
-
-
-def _crossings(inside: NDArray[np.bool_], usable: NDArray[np.bool_], axis: int) -> tuple[Any, Any]:
-    """Indices of neighbouring cells along an axis of which one is inside, both of shape ``(edges, dimensions)``."""
-    first = (slice(None),) * axis + (slice(None, -1),)
-    second = (slice(None),) * axis + (slice(1, None),)
-    low = np.argwhere((inside[first] != inside[second]) & usable[first] & usable[second])
-    return low, low + np.eye(inside.ndim, dtype=int)[axis]
 
 
 def _values(coordinate: xr.DataArray, dims: list[str], cells: NDArray[np.intp]) -> NDArray[Any]:

@@ -214,15 +214,10 @@ def interruptible(function: Callable[[], Result]) -> Result:
 
 
 @contextmanager
-def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]:
+def stop_on_interrupt() -> Iterator[threading.Event]:
     """Event that the first Ctrl-C or SIGTERM within the block sets. The second one acts as it does elsewhere.
 
     The interrupt that ends the block has the number of the first signal.
-
-    Parameters
-    ----------
-    under_way : callable
-        Returns what the sweep waits for after the first one.
     """
     stopped = threading.Event()
     if threading.current_thread() is not threading.main_thread():
@@ -237,7 +232,7 @@ def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]
 
     def interrupt(number: int, frame: Any) -> None:
         # A second one that comes before the message is out would end the process without it.
-        logger.info("stopping when %s (Ctrl-C again: stop now and lose that)", under_way())
+        logger.info("stopping when what is compiled and run now is done (Ctrl-C again: stop now and lose that)")
         restore()
         received.append(number)
         stopped.set()

@@ -403,18 +403,13 @@ class Work:
     @contextmanager
     def begun(self, total: int | None) -> Iterator[None]:
         """Let tasks be run within the block; `total` is the number of all parts, if all of them are computed."""
-
-        def under_way() -> str:
-            learnt = not math.isnan(self._sizes.seconds_per_cell)
-            return "the tasks under way are done" if learnt else "compilation and the first cells are done"
-
         config, store = self.plan.config, self.store
         with self._execution.open() as self._workers:
             span = config.scene.values.get("time.span", 1.0)
             kind = kernels_of(config), self.plan.parts, round(math.log2(span))
             self._sizes = TaskSizes(self.plan.side_by_side, self._workers.concurrency, kind)
             # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
-            stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
+            stopping = stop_on_interrupt() if isinstance(store, Checkpoint) else nullcontext(Event())
             bar = progress_bar(total, self._execution.progress, int(store.done.sum()))
             with stopping as self._stopped, bar as self._bar:
                 try:

@@ -117,14 +117,18 @@ def threshold(
     path = as_named(path, whole.scene.structure.elsewhere)
     sampled = () if whole.sample is None else (one for factor in whole.sample.factors for one in factor.paths)
     check_word(regime, whole.scene, {path, *whole.axes.columns, *sampled})
-    ends = interval(whole, path, between)
+    low, high = ends = interval(whole, path, between)
+    si = sweepable(whole.scene)[path].attributes["units"]
     if unit is None:
         given = (str(spelled(end)) for end in (() if between is None else between) if end is not None)
         unit = common_unit(given) or written_unit(whole.source, path)
     else:
-        si = sweepable(whole.scene)[path].attributes["units"]
         check_unit(unit, Parameter(si, path), "unit")
-    values, allowed = _scan(whole, path, ends, tolerance, scan)
+    within = Parameter(si, "tolerance of a threshold", lower=0.0, open_lower=True)
+    allowed = quantity(_TOLERANCE * max(abs(low), abs(high)) if tolerance is None else tolerance, within, "tolerance")
+    count = SCAN if scan is None else int(quantity(scan, Parameter("1", "number of runs", lower=2, whole=True), "scan"))
+    values = (np.geomspace if low > 0.0 and high >= _WIDE * low else np.linspace)(low, high, count)
+    values[[0, -1]] = ends
     if whole.sample is not None:
         found = distribution(whole, path, regime, values, allowed, jobs=jobs)
         return found.assign_attrs(threshold_unit=unit)
@@ -241,22 +245,6 @@ def distribution(
             "scan": f"{len(values)} runs for each of {total} points of the sample",
         },
     )
-
-
-def _scan(
-    config: Config, path: str, ends: tuple[float, float], tolerance: Any, scan: int | None
-) -> tuple[NDArray[np.float64], float]:
-    """Values at which changes are looked for, and the error allowed."""
-    low, high = ends
-    parameter = swept_parameter(sweepable(config.scene), path, "path")
-    assert isinstance(parameter, Parameter)
-    error = Parameter(parameter.unit, "tolerance of a threshold", lower=0.0, open_lower=True)
-    allowed = quantity(_TOLERANCE * max(abs(low), abs(high)) if tolerance is None else tolerance, error, "tolerance")
-    count = SCAN if scan is None else int(quantity(scan, Parameter("1", "number of runs", lower=2, whole=True), "scan"))
-    spaced = np.geomspace if low > 0.0 and high >= _WIDE * low else np.linspace
-    values = spaced(low, high, count)
-    values[[0, -1]] = low, high
-    return values, allowed
 
 
 def interval(whole: Config, path: str, between: Any, *forms: tuple[str, str]) -> tuple[float, float]:
