@@ -205,19 +205,15 @@ def sweep(
 
 def _sweep_section(axes: Axes) -> dict[str, Any]:
     """Axes as the section ``sweep`` of a configuration. Paths over shared or several dimensions become points."""
-    shared = {dim for dims, _ in axes.columns.values() if len(dims) > 1 for dim in dims}
-    names = [dims for dims, _ in axes.columns.values()]
-    shared |= {dims[0] for dims in names if names.count(dims) > 1}
-    grid = {path: values.tolist() for path, (dims, values) in axes.columns.items() if shared.isdisjoint(dims)}
-    sizes = {dim: size for dim, size in axes.sizes.items() if dim in shared}
-    index = np.unravel_index(np.arange(math.prod(sizes.values())), tuple(sizes.values())) if sizes else ()
-    indices = dict(zip(sizes, index, strict=True))
-    points = {
-        path: values[tuple(indices[dim] for dim in dims)].tolist()
-        for path, (dims, values) in axes.columns.items()
-        if not shared.isdisjoint(dims)
-    }
-    return {kind: columns for kind, columns in (("points", points), ("grid", grid)) if columns}
+    columns = {path: xr.DataArray(values, dims=dims) for path, (dims, values) in axes.columns.items()}
+    uses = [dim for one in columns.values() for dim in one.dims]
+    alone = [path for path, one in columns.items() if [uses.count(dim) for dim in one.dims] == [1]]
+    others = [path for path in columns if path not in alone]
+    every = xr.broadcast(*(columns[path] for path in others))
+    order = [dim for dim in axes.sizes if every and dim in every[0].dims]
+    points = {path: one.transpose(*order).values.ravel().tolist() for path, one in zip(others, every, strict=True)}
+    grid = {path: columns[path].values.tolist() for path in alone}
+    return {kind: given for kind, given in (("points", points), ("grid", grid)) if given}
 
 
 def compute(
