@@ -208,9 +208,8 @@ def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, N
         start = stop
     yield "steps", result.steps
     yield "certified", result.certified
-    if result.because is not None:
-        yield "uncertified_because", result.because
-    if result.stiffness is not None:
-        yield "stiffness", result.stiffness
+    for name, column in (("uncertified_because", result.because), ("stiffness", result.stiffness)):
+        if column is not None:
+            yield name, column
     if result.errors is not None:
         yield from zip((f"{name}_error" for name in with_errors(outcomes)), result.errors.T, strict=True)

@@ -19,7 +19,6 @@ from ringsweep.models import model_of
 from ringsweep.quantities.variables import OUTCOMES, Variable
 from ringsweep.runs.cells import TaskResult, compute_task, coordinates
 from ringsweep.runs.reuse import EarlierSweep
-from ringsweep.runs.task_sizes import chains_of
 from ringsweep.runs.warnings import warn_of_results
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.checkpoint import Checkpoint
@@ -137,7 +136,10 @@ class Chains(Grid):
     def together(self) -> NDArray[np.integer]:
         """Positions of the cells of each chain."""
         dim, _ = self.asked.chains(self.config.axes)
-        return chains_of(self.layout, list(self.config.axes.sizes).index(dim))
+        sizes = self.layout.sizes
+        positions = self.layout.positions(list(np.indices(sizes).reshape(len(sizes), -1))).reshape(sizes)
+        along = list(self.config.axes.sizes).index(dim)
+        return np.moveaxis(positions, along, -1).reshape(-1, sizes[along])
 
     def coordinates(self) -> dict[str, Any]:
         """Coordinates of the dataset."""

@@ -56,7 +56,8 @@ def check_room(plan: Grid, cells: int, folder: Path | None) -> None:
     """
     needed, there = memory_needed(plan, folder is None), memory_of_machine()
     if needed > there:
-        raise InputError("sweep", f"the grid needs {size(needed)} of memory, and this machine has {size(there)}")
+        cure = ": name a file as output" * (folder is None)
+        raise InputError("sweep", f"the grid needs {size(needed)} of memory, and this machine has {size(there)}{cure}")
     if folder is None or plan.at_most:
         return
     needed, there = float(cells * plan.bytes_of_cell()), shutil.disk_usage(folder).free

@@ -7,6 +7,7 @@ size does not depend on the number of runs, and the numbers whose quantiles are 
 from __future__ import annotations
 
 import json
+import logging
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,15 +23,19 @@ from ringsweep.config.axes import dimension
 from ringsweep.config.uncertain import CENSORED, Sample, censored
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
-from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.flags import FAILED, REGIMES
 from ringsweep.quantities.variables import OUTCOMES, QUANTILE_ENDS, SAMPLED, Variable
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.runs.grid import Chunk, Columns, Grid
-from ringsweep.runs.warnings import warn_of_sample
 from ringsweep.statistics import CONFIDENCE, quantiles, share_interval, sobol_indices, sobol_sums
 from ringsweep.storage.checkpoint import Checkpoint
 from ringsweep.storage.chunks import CHUNK, Layout, chunk_shape
 from ringsweep.storage.provenance import environment, processor
+
+logger = logging.getLogger("ringsweep")
+
+# Share of runs without certificate that is worth a warning.
+_MANY_UNSURE = 0.01
 
 # Bytes of the sums of a chunk, and of a run that is kept.
 _CHUNK_BYTES, _RUN_BYTES = 32e6, 200
@@ -126,7 +131,13 @@ class Sampled(Grid):
 
     def warn(self, results: xr.Dataset) -> None:
         """Warn of runs that failed or have no certificate."""
-        warn_of_sample(results, self.config)
+        runs = results["runs"].sum([dim for dim in results["runs"].dims if dim not in ("word", "certificate")]).values
+        share, failed = runs[:, 0].sum() / runs.sum(), int(runs[FAILED].sum())
+        if share > _MANY_UNSURE:
+            cure = "" if self.config.certifies else ": the solver does not certify"
+            logger.warning("%.1f %% of the runs have no certificate, and widen the intervals%s", 100 * share, cure)
+        if failed:
+            logger.warning("%d runs failed", failed)
 
     def variables(self) -> dict[str, Variable]:
         """Declarations of the statistics; their dimensions are those within a cell."""

@@ -116,7 +116,11 @@ class Refined(Grid):
     def columns(self, columns: Columns) -> Columns:
         """Columns of the dataset, from those of the cells that were run."""
         self._complete(tuple(slice(None) for _ in self.layout.sizes), columns)
-        return columns | {name: _with_nan(columns[name]) for name in columns if name in self.gaps}
+        for name in set(self.gaps) & set(columns):
+            # Floats with NaN for `MISSING`, in the type in which xarray reads them from a file.
+            floats = columns[name].astype(np.float32 if columns[name].dtype.itemsize <= 2 else np.float64)
+            columns[name] = np.where(columns[name] == MISSING, np.array(np.nan, floats.dtype), floats)
+        return columns
 
     def chunks(self, checkpoint: Checkpoint) -> Iterator[Chunk]:
         """Slices of each chunk in the grid, and the columns of the file there."""
@@ -142,13 +146,6 @@ class Refined(Grid):
             + _in_words(audit),
             "refined_dimensions": json.dumps(self.asked.dims),
         }
-
-
-def _with_nan(column: NDArray[Any]) -> NDArray[Any]:
-    """A column of whole numbers as floats with NaN for `MISSING`, in the type in which xarray reads it from a file."""
-    floats = column.astype(np.float32 if column.dtype.itemsize <= 2 else np.float64)
-    floats[column == MISSING] = np.nan
-    return floats
 
 
 def _in_words(audit: Findings) -> str:

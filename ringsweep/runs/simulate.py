@@ -188,20 +188,17 @@ def _open_contact_at_end(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
 
 def _describe(outcome: xr.Dataset) -> str:
     """Outcome of a run in words."""
-    regime = REGIMES[int(outcome["regime"])]
-    certificate = "" if outcome["certified"] == 1 else ", not certified"
-    if "t_separation" in outcome and np.isfinite(outcome["t_separation"]):
-        contact = ("no contact", "contact 1", "contact 2", "both contacts")[int(outcome["separating_contact"])]
-        after = ""
+    happened = [name for name in ("t_separation", "period") if name in outcome and np.isfinite(outcome[name])]
+    told = [REGIMES[int(outcome["regime"])]]
+    if "t_separation" in happened:
+        told[0] += f" ({REGIMES[int(outcome['motion'])]})"
+        told.append(("no contact", "contact 1", "contact 2", "both contacts")[int(outcome["separating_contact"])])
+        told.append(f"t = {float(outcome['t_separation']):.6g} s")
         if "aftermath" in outcome:
             lost, hits = int(outcome["separations"]), int(outcome["impacts"])
-            counted = f"{lost} loss{'es' * (lost != 1)} of contact and {hits} impact{'s' * (hits != 1)}"
-            after = f", then {AFTERMATHS[int(outcome['aftermath'])]}, with {counted}"
-        return (
-            f"{regime} ({REGIMES[int(outcome['motion'])]}), {contact}, "
-            f"t = {float(outcome['t_separation']):.6g} s{after}{certificate}"
-        )
-    period = ""
-    if "period" in outcome and np.isfinite(outcome["period"]):
-        period = f", period {float(outcome['period']):.6g} s"
-    return f"{regime}, t = {float(outcome['t_end']):.6g} s{period}{certificate}"
+            told.append(f"then {AFTERMATHS[int(outcome['aftermath'])]}")
+            told.append(f"with {lost} loss{'es' * (lost != 1)} of contact and {hits} impact{'s' * (hits != 1)}")
+    else:
+        told.append(f"t = {float(outcome['t_end']):.6g} s")
+        told += [f"period {float(outcome['period']):.6g} s"] if happened else []
+    return ", ".join(told + ["not certified"] * (outcome["certified"].item() != 1))

@@ -34,9 +34,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("ringsweep")
 
-#: Largest number of cells of a sweep in memory, where they take some gigabytes.
-MAX_CELLS_IN_MEMORY = 10_000_000
-
 # Seconds of a refined sweep that are lost if it is killed.
 _WRITE_INTERVAL = 1.0
 
@@ -226,8 +223,6 @@ def compute(
     """Run a validated configuration in memory, with or without warnings about the results; see :func:`run`."""
     plan = plan_of(config, reuse, whole=True)
     layout = plan.layout
-    if layout.total > MAX_CELLS_IN_MEMORY:
-        raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
     check_room(plan, plan.grid.total, None)
     store = MemoryStore(layout.total)
     plan.compute(Work(plan, store, execution))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.runs.cells import TaskResult
-from ringsweep.storage.chunks import CHUNK, Layout
+from ringsweep.storage.chunks import CHUNK
 
 logger = logging.getLogger("ringsweep")
 
@@ -99,9 +99,3 @@ def divide_into_tasks(
         count = max(sizes.next(groups.size) // groups.shape[1], sizes.side_by_side)
         yield np.sort(groups[:count], axis=None)
         groups = groups[count:]
-
-
-def chains_of(layout: Layout, dim: int) -> NDArray[np.intp]:
-    """Positions of the cells along the `dim`-th dimension of a grid, a row for each chain."""
-    positions = layout.positions(list(np.indices(layout.sizes).reshape(len(layout.sizes), -1)))
-    return np.moveaxis(positions.reshape(layout.sizes), dim, -1).reshape(-1, layout.sizes[dim])

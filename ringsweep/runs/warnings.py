@@ -29,9 +29,6 @@ _ENDED = (RIDING, FAILED, SEPARATING, JAMMED)
 
 logger = logging.getLogger("ringsweep")
 
-# Share of runs without certificate that is worth a warning.
-_MANY_UNSURE = 0.01
-
 
 def warn_of_results(results: xr.Dataset, config: Config, *, counted: bool = False) -> None:
     """Warn of steps beyond the limit of stability, of motions that have not settled, and of runs that end at t = 0.
@@ -173,22 +170,3 @@ def _hint_at_idle_axes(results: xr.Dataset) -> None:
             continue
         why = ": no contact meets an edge of the zone, or friction is alike on both sides" if "zone" in dim else ""
         logger.info("no number depends on %s%s", dim, why)
-
-
-def warn_of_sample(results: xr.Dataset, config: Config) -> None:
-    """Warn of runs of a sample that failed or have no certificate.
-
-    Parameters
-    ----------
-    results : xarray.Dataset
-        Statistics of all cells, in memory or on disk.
-    config : Config
-        Configuration of the runs.
-    """
-    runs = results["runs"].sum([dim for dim in results["runs"].dims if dim not in ("word", "certificate")]).values
-    share, failed = runs[:, 0].sum() / runs.sum(), int(runs[FAILED].sum())
-    if share > _MANY_UNSURE:
-        cure = "" if config.certifies else ": the solver does not certify"
-        logger.warning("%.1f %% of the runs have no certificate, and widen the intervals%s", 100 * share, cure)
-    if failed:
-        logger.warning("%d runs failed", failed)
