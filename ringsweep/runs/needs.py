@@ -62,9 +62,8 @@ def check_room(plan: Grid, cells: int, folder: Path | None) -> None:
         return
     needed, there = float(cells * plan.bytes_of_cell()), shutil.disk_usage(folder).free
     if needed > there:
-        raise InputError(
-            "sweep", f"{cells} cells need {size(needed)} on the disk, and {size(there)} are free in {folder}"
-        )
+        problem = f"{cells} cells need {size(needed)} on the disk, and {size(there)} are free in {folder}"
+        raise InputError("sweep", problem)
 
 
 def memory_needed(plan: Grid, in_memory: bool) -> float:

@@ -135,10 +135,8 @@ def _measure(config: Config, target: float, cells: int, rounds: int, progress: b
         raise InputError("sweep.sample", "precision measures the cells of a grid: leave sample out")
     if len(scene.structures) > 1:
         kind = "points" if LAW in config.source["sweep"].get("points", {}) else "grid"
-        raise InputError(
-            f"sweep.{kind}.{LAW}",
-            f"each of {', '.join(scene.structures)} needs methods and a reference of its own: give one law here",
-        )
+        laws = ", ".join(scene.structures)
+        raise InputError(f"sweep.{kind}.{LAW}", f"each of {laws} needs a reference of its own: give one law here")
     structure = scene.structure
     model = model_of(structure)
     names = model.columns(structure)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED, LABELS, MISSING, OUTCOMES
-from ringsweep.runs.decisions import Decided, Findings, Run, refine
+from ringsweep.runs.decisions import Decided, Run, refine
 from ringsweep.runs.grid import Chunk, Columns, Grid
 from ringsweep.storage.checkpoint import Checkpoint
 
@@ -135,6 +135,14 @@ class Refined(Grid):
         """Attributes of the dataset: also what was run, and what the audit says."""
         audit, total = self._decided.audit, self._decided.origin.size
         computed = total - int(np.count_nonzero(self._decided.origin == INFERRED))
+        words = f"{computed} of {total} cells are run ({100 * computed / total:.3g} %), the others are inferred; "
+        if audit.cells:
+            words += f"{audit.cells} of the inferred cells are audited: {audit.wrong} had been inferred wrongly"
+            words += f", {audit.corrected} were corrected in following these" * bool(audit.wrong or audit.corrected)
+            most = percent_at_most(audit.bound)
+            words += f"; of the cells still inferred at most {most} are wrong (at 95 % confidence)"
+        else:
+            words += "none of them is audited"
         return super().attributes() | {
             "cells_computed": computed,
             "audit_cells": audit.cells,
@@ -142,17 +150,6 @@ class Refined(Grid):
             "audit_corrected": audit.corrected,
             "audit_bound": audit.bound,
             "audit_seed": SEED,
-            "audit": f"{computed} of {total} cells are run ({100 * computed / total:.3g} %), the others are inferred; "
-            + _in_words(audit),
+            "audit": words,
             "refined_dimensions": json.dumps(self.asked.dims),
         }
-
-
-def _in_words(audit: Findings) -> str:
-    if not audit.cells:
-        return "none of them is audited"
-    words = f"{audit.cells} of the inferred cells are audited: {audit.wrong} had been inferred wrongly"
-    if audit.wrong or audit.corrected:
-        words += f", {audit.corrected} were corrected in following these"
-    words += f"; of the cells still inferred at most {percent_at_most(audit.bound)} are wrong"
-    return f"{words} (at 95 % confidence)"

@@ -295,12 +295,6 @@ def _scanned(runs: xr.Dataset, axis: xr.DataArray, label: str) -> str:
     return text + (f"; {unsure} not certified" if unsure else "")
 
 
-def _with_error(value: float, error: float) -> str:
-    """A number with as many digits as its error leaves, and the error."""
-    digits = max(1 - floor(log10(error)), 0) if error > 0.0 else 15
-    return f"{value:.{digits}f} ± {error:.1e}"
-
-
 def plain(found: xr.Dataset) -> dict[str, Any]:
     """What :func:`threshold` found, as plain numbers in the unit of the answer."""
     path, unit = found.attrs["threshold_path"], found.attrs.get("threshold_unit", "")
@@ -344,7 +338,9 @@ def in_words(found: xr.Dataset) -> str:
     else:
         lines = []
         for one in told["thresholds"]:
-            at = f"{path} = {_with_error(one['value'], one['error'])}{unit}"
+            # As many digits as the error leaves.
+            digits = max(1 - floor(log10(one["error"])), 0) if one["error"] > 0.0 else 15
+            at = f"{path} = {one['value']:.{digits}f} ± {one['error']:.1e}{unit}"
             side = "below" if one["does"] == "begins" else "above"
             lines.append(f"{regime} {one['does']} at {at}; {side}: {one['beyond']}")
     return "\n".join(
