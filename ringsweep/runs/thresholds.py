@@ -117,7 +117,7 @@ def threshold(
     path = as_named(path, whole.scene.structure.elsewhere)
     sampled = () if whole.sample is None else (one for factor in whole.sample.factors for one in factor.paths)
     check_word(regime, whole.scene, {path, *whole.axes.columns, *sampled})
-    low, high = ends = interval(whole, path, between)
+    low, high = interval(whole, path, between)
     si = sweepable(whole.scene)[path].attributes["units"]
     if unit is None:
         given = (str(spelled(end)) for end in (() if between is None else between) if end is not None)
@@ -128,16 +128,15 @@ def threshold(
     allowed = quantity(_TOLERANCE * max(abs(low), abs(high)) if tolerance is None else tolerance, within, "tolerance")
     count = SCAN if scan is None else int(quantity(scan, Parameter("1", "number of runs", lower=2, whole=True), "scan"))
     values = (np.geomspace if low > 0.0 and high >= _WIDE * low else np.linspace)(low, high, count)
-    values[[0, -1]] = ends
     if whole.sample is not None:
         found = distribution(whole, path, regime, values, allowed, jobs=jobs)
         return found.assign_attrs(threshold_unit=unit)
     try:
-        one = with_values(config, [*settings, (path, ends[0])])
+        one = with_values(config, [*settings, (path, low)])
     except InputError as error:
         if error.problem.startswith("missing"):
             raise
-        raise InputError("from", f"{path} = {ends[0]:g} is not allowed: {error.path}: {error.problem}") from None
+        raise InputError("from", f"{path} = {low:g} is not allowed: {error.path}: {error.problem}") from None
     if one.axes.sizes:
         raise InputError("sweep", "several friction laws, but a threshold is that of one: --set friction.law=...")
     scanned = load(dict(one.source) | {"sweep": {"grid": {path: values.tolist()}}})
