@@ -9,6 +9,7 @@ import xarray as xr
 import ringsweep
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
+from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs import boundaries
 from ringsweep.storage import netcdf
 
@@ -224,19 +225,43 @@ class TestValueThatTheMapLacks:
         netcdf.save(ds, "my.nc")
         return netcdf
 
-    def test_boundary_is_that_at_the_nearest_cells_and_both_say_so(self, folder, monkeypatch, caplog):
+    @pytest.mark.slow
+    def test_boundary_is_that_at_the_value_asked_for(self, folder, scene, caplog):
+        assert cli.main(["map", "my.nc", *self.ASKED]) == 0
+        assert "zone.half_angle: 15° is not in the dataset: the cells there are run" in caplog.messages
+        found = folder.load("my-zone-half_angle-15deg-separating.nc")
+        assert found.sizes["vertex"] >= 1
+        assert (found.error <= 1e-9).all()
+        np.testing.assert_allclose(found.zone_half_angle, np.radians(15.0), rtol=1e-15)
+        at = scene | {"zone": {"half_angle": "15 deg"}}
+        for place in found.drive_amplitude.values:
+            sides = ringsweep.sweep(at, {"drive.amplitude": [place - 1.1e-9, place + 1.1e-9]}, progress=False)
+            assert (sides.certified == 1).all()
+            assert (sides.ringsweep.words() == "separating").sum() == 1
+
+    def test_map_below_the_curves_is_that_at_the_value_asked_for(self, folder, monkeypatch):
         drawn = []
         monkeypatch.setattr(plots, "save", lambda figure, path: drawn.append(figure))
         assert cli.main(["map", "my.nc", *self.ASKED]) == 0
-        assert "zone.half_angle: 15° is not in the dataset: the nearest value is taken, 13.75°" in caplog.messages
-        found = folder.load("my-zone-half_angle-15deg-separating.nc")
-        assert found.sizes["vertex"] >= 1
-        np.testing.assert_allclose(np.degrees(found.zone_half_angle), 13.75)
-        assert "half-angle of the zone = 13.75°" in drawn[0].axes[0].get_title()
+        assert "half-angle of the zone = 15°" in drawn[0].axes[0].get_title()
+        assert "nearest" not in drawn[0].axes[0].get_title()
 
     def test_value_outside_the_axis_is_refused(self, folder, capsys):
         assert cli.main(["map", "my.nc", "--sel", "zone.half_angle=42 deg", *self.ASKED[2:]]) == 2
         assert "half-angle of the zone must be" in capsys.readouterr().err
+
+    def test_value_that_a_run_cannot_have_alone_is_refused(self, ds, folder, capsys):
+        paired = ds.assign_coords(another=("zone_half_angle", np.arange(13.0), {"path": "gravity", "units": "m s-2"}))
+        folder.save(paired, "my.nc")
+        assert cli.main(["map", "my.nc", *self.ASKED]) == 2
+        assert "zone_half_angle is no axis of one number: give 13.75°" in capsys.readouterr().err
+
+    def test_line_of_a_refined_map_of_which_no_cell_was_run_is_run(self, ds):
+        line = ds.isel(zone_half_angle=3)
+        inferred = line.assign(origin=line.origin * 0 + INFERRED, certified=line.certified * np.nan)
+        assert ringsweep.boundary(inferred, "separating").sizes["vertex"] == 0
+        there = boundaries.run_at(inferred, {"zone_half_angle": np.radians(15.0)}, "separating")
+        assert ringsweep.boundary(there, "separating", 1e-3).sizes["vertex"] >= 1
 
     def test_curves_are_not_drawn_over_another_slice(self, ds):
         curves = ringsweep.boundary(ds.isel(zone_half_angle=4), "separating", 1e-3)

@@ -14,7 +14,7 @@ from ringsweep.plots.datasets import is_sampled, resolve
 from ringsweep.plots.look import panel
 from ringsweep.plots.maps import Map, suitable
 from ringsweep.plots.sections import points_of
-from ringsweep.plots.selection import select
+from ringsweep.plots.selection import select, select_grid
 from ringsweep.storage import files, netcdf
 
 
@@ -63,7 +63,7 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         word = {"word": arguments.boundaries} if is_sampled(result) else {}
         Map(along, (arguments.x, arguments.y), arguments.var, word).check_takes_curves()
 
-        from ringsweep.runs.boundaries import boundary
+        from ringsweep.runs.boundaries import boundary, run_at
         from ringsweep.runs.executors import Execution
         from ringsweep.runs.probabilities import nominal
         from ringsweep.runs.sweep import compute
@@ -73,7 +73,9 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         # Of a sampled sweep the one in which every uncertain parameter has its median.
         located = compute(nominal(result), Execution(progress=False)) if sampled else result
         held = {name: value for name, value in selection.items() if name != "word" or not sampled}
-        located, _ = select(located, held)
+        located, missing = select_grid(located, held)
+        if missing:
+            located = run_at(located, missing, arguments.boundaries)
         curves = boundary(located, arguments.boundaries, tolerance)
         if sampled:
             selection["word"] = arguments.boundaries

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -81,29 +81,85 @@ def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, 
         Names and values of the coordinates held, for a title.
     """
     texts = []
-    for wanted, value in sel.items():
-        name = resolve("sel", wanted, [n for n in {**ds.sizes, **ds.coords} if n in ds.dims or ds[n].ndim == 1])
-        coordinate = ds[name]
-        if is_numeric(coordinate):
-            number = quantity(value, _range_of(coordinate), f"sel.{wanted}")
-            index = int(np.nanargmin(np.abs(coordinate.values - number)))
-        else:
-            names = [str(one) for one in coordinate.values]
-            index = names.index(resolve("sel", str(value), names))
+    for wanted, coordinate, index, asked in _places(ds, sel):
+        ds = ds.isel({coordinate.dims[0]: index})
         text = value_text(coordinate[index])
-        # A value between others is rounded as they are: 0 of linspace(-1, 1, 21) may be 1e-16.
-        if is_numeric(coordinate) and not np.isclose(
-            coordinate.values[index], number, rtol=1e-12, atol=1e-15 * np.nanmax(np.abs(coordinate.values))
-        ):
-            one = coordinate[index].astype(float)
-            pairs = ((amount_text(one, digits), amount_text(one.copy(data=number), digits)) for digits in (4, 8, 17))
-            taken, given = next(pair for pair in pairs if pair[0] != pair[1])
+        if asked is not None:
+            taken, given = _told_apart(coordinate[index], asked)
             told = "%s: %s is not in the dataset: the nearest value is taken, %s"
             logger.warning(told, wanted, plain_text(given), plain_text(taken))
             text = f"{long_name(coordinate)} = {taken} (nearest to {given})"
-        ds = ds.isel({coordinate.dims[0]: index})
         texts.append(text)
     return ds, texts
+
+
+def select_grid(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, dict[str, float]]:
+    """Hold axes of a grid, and find the values given that it lacks.
+
+    Returns
+    -------
+    xarray.Dataset
+        Without the dimensions that are held, at the nearest values.
+    dict of str to float
+        The values given of those coordinates whose nearest value is another.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a value lies outside its axis, or a value that is missing is not that of an axis of one
+        number: a run could not have it alone.
+    """
+    missing = {}
+    for wanted, coordinate, index, asked in _places(ds, sel):
+        dim = str(coordinate.dims[0])
+        if asked is not None:
+            taken, given = map(plain_text, _told_apart(coordinate[index], asked))
+            if [one.name for one in swept(ds) if dim in one.dims] != [dim]:
+                problem = f"{given} is not in the dataset, and {dim} is no axis of one number: give {taken}"
+                raise InputError(f"sel.{wanted}", problem)
+            logger.info("%s: %s is not in the dataset: the cells there are run", wanted, given)
+            missing[dim] = asked
+        ds = ds.isel({dim: index})
+    return ds, missing
+
+
+def _places(ds: xr.Dataset, sel: Mapping[str, float | str]) -> Iterator[tuple[str, xr.DataArray, int, float | None]]:
+    """Where coordinates are held.
+
+    Yields
+    ------
+    str
+        Name as given.
+    xarray.DataArray
+        The coordinate.
+    int
+        Index of its nearest value.
+    float or None
+        The value given, in SI units, if it differs from the nearest by more than rounding.
+    """
+    for wanted, value in sel.items():
+        name = resolve("sel", wanted, [n for n in {**ds.sizes, **ds.coords} if n in ds.dims or ds[n].ndim == 1])
+        coordinate = ds[name]
+        asked = None
+        if is_numeric(coordinate):
+            number = quantity(value, _range_of(coordinate), f"sel.{wanted}")
+            index = int(np.nanargmin(np.abs(coordinate.values - number)))
+            # A value between others is rounded as they are: 0 of linspace(-1, 1, 21) may be 1e-16.
+            rounding = 4.0 * np.finfo(float).eps * np.nanmax(np.abs(coordinate.values))
+            if not np.isclose(coordinate.values[index], number, rtol=1e-12, atol=rounding):
+                asked = number
+        else:
+            names = [str(one) for one in coordinate.values]
+            index = names.index(resolve("sel", str(value), names))
+        yield wanted, coordinate, index, asked
+        ds = ds.isel({coordinate.dims[0]: index})
+
+
+def _told_apart(taken: xr.DataArray, asked: float) -> tuple[str, str]:
+    """Texts of the value taken and of the value asked for, with as many digits as they need to differ."""
+    one = taken.astype(float)
+    pairs = ((amount_text(one, digits), amount_text(one.copy(data=asked), digits)) for digits in (4, 8, 17))
+    return next(pair for pair in pairs if pair[0] != pair[1])
 
 
 def _range_of(coordinate: xr.DataArray) -> Parameter:

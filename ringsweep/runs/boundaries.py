@@ -170,6 +170,44 @@ def bisect(
         left[which[~certified]] = False
 
 
+def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int | None = None) -> xr.Dataset:
+    """Run the cells of a map at other values of coordinates that are held, to locate a boundary there.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        As for :func:`boundary`.
+    held : mapping of str to float
+        By coordinate its other value, in SI units.
+    regime : str
+        As for :func:`boundary`.
+    jobs : int, optional
+        Number of threads; all cores by default.
+
+    Returns
+    -------
+    xarray.Dataset
+        The same cells but for those values; refined if the sweep was.
+
+    Raises
+    ------
+    InputError
+        As for :func:`boundary`.
+    """
+    label, _, dims = _checked(ds, regime)
+    source = configuration_of(ds)
+    _check_cells(ds, label, load(source), jobs)
+    columns = {str(c.name): c for c in swept(ds)}
+    fixed = {name: held.get(name, c.item()) for name, c in columns.items() if name not in dims}
+    values = {dim: columns[dim].values.tolist() for dim in dims} | {name: [value] for name, value in fixed.items()}
+    sweep: dict[str, Any] = {"grid": {columns[name].attrs["path"]: along for name, along in values.items()}}
+    if refine := source["sweep"].get("refine"):
+        # Along the axes that are left, whichever were named.
+        sweep["refine"] = refine if refine is True else {key: refine[key] for key in refine if key != "axes"}
+    found = compute(load(source | {"sweep": sweep}), Execution(jobs, progress=False))
+    return found.isel(dict.fromkeys(fixed, 0))
+
+
 def word_in(ds: xr.Dataset, word: str) -> tuple[str, int]:
     """Classification that has a word, `regime` or `aftermath`, and the flag of the word.
 
