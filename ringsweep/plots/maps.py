@@ -22,7 +22,7 @@ from ringsweep.plots import labels, look, map_colours
 from ringsweep.plots.datasets import is_sampled, mapped, require_sweep, scene_text
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
 from ringsweep.plots.probability import probability_panel
-from ringsweep.plots.sections import bifurcation, has_circle, has_diagram, multiplier_circle, points_of
+from ringsweep.plots.sections import axes_of, bifurcation, multiplier_circle, points_of
 from ringsweep.plots.selection import select
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import AUDITED, INFERRED, POINTS, swept
@@ -153,9 +153,9 @@ def suitable(ds: xr.Dataset, var: str | None, sel: Mapping[str, float | str], pl
     """
     require_sweep(ds)
     ds = ds.isel({name: 0 for name in (one.replace(".", "_") for one in sel) if name in ds.dims})
-    if var in POINTS or (plain and var is None and has_diagram(ds)):
+    if var in POINTS or (plain and var is None and any(len(axes_of(ds, name)) == 1 for name in points_of(ds))):
         return "diagram", var or points_of(ds)[0]
-    if plain and str(var).startswith("multiplier_") and has_circle(ds):
+    if plain and str(var).startswith("multiplier_") and len(axes_of(ds, "multiplier_angle_1")) == 1:
         return "circle", str(var)
     is_cell = is_sampled(ds) and all(dim == "word" or size == 1 for dim, size in ds["probability"].sizes.items())
     if plain and var in (None, "probability") and is_cell and "word" in ds.dims:

@@ -35,22 +35,12 @@ _HEIGHTS = {"diagram": 0.5, "lyapunov": 0.25, "multiplier_1": 0.25, "circle": 0.
 _DIRECTION = "direction"
 
 
-def has_diagram(ds: xr.Dataset) -> bool:
-    """Whether a dataset holds sections along one axis."""
-    return any(len(_axes_of(ds, name)) == 1 for name in points_of(ds)[:1])
-
-
-def has_circle(ds: xr.Dataset) -> bool:
-    """Whether a dataset holds multipliers with their arguments along one axis."""
-    return len(_axes_of(ds, "multiplier_angle_1")) == 1
-
-
 def points_of(ds: xr.Dataset) -> list[str]:
     """Variables of the points of a section, place and velocity first; none without a section."""
     return [name for name in POINTS if name in ds]
 
 
-def _axes_of(ds: xr.Dataset, name: str) -> list[str]:
+def axes_of(ds: xr.Dataset, name: str) -> list[str]:
     """Dimensions of a variable beside its section and the direction; none without this variable."""
     return [str(dim) for dim in ds[name].dims if dim not in ("section", _DIRECTION)] if name in ds else []
 
@@ -406,7 +396,7 @@ def _axis(ds: xr.Dataset, x: str | None, needed: str | None = None) -> Axis:
     """The axis of a diagram."""
     if needed is None:
         _require_section(ds)
-    dims = _axes_of(ds, needed or points_of(ds)[0])
+    dims = axes_of(ds, needed or points_of(ds)[0])
     if len(dims) != 1:
         problem = f"sections along {', '.join(dims) or 'no axis'}, and a diagram has one axis: hold the others by sel"
         if needed is not None:
