@@ -7,7 +7,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -98,7 +97,7 @@ def save_page(
     sweep = _Sweep.of(ds, x, y, var, sel or {})
     with replacing(path) as temporary:
         page = file_html(_document(sweep), INLINE, str(ds.attrs.get("title", "ringsweep")))
-        Path(temporary).write_text(page.replace("<head>", f"<head>\n    {_VIEWPORT}", 1), encoding="utf-8")
+        temporary.write_text(page.replace("<head>", f"<head>\n    {_VIEWPORT}", 1), encoding="utf-8")
 
 
 def check_page(path: str | os.PathLike[str]) -> None:

@@ -7,7 +7,6 @@ import html
 import io
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -99,7 +98,7 @@ def report(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     scene = yaml.safe_dump(configuration, sort_keys=False, allow_unicode=True)
     parts.append(f'<details><summary>Configuration</summary><pre class="code">{html.escape(scene)}</pre></details>')
     with replacing(path) as temporary:
-        Path(temporary).write_text("\n".join(parts) + "</body></html>\n", encoding="utf-8")
+        temporary.write_text("\n".join(parts) + "</body></html>\n", encoding="utf-8")
 
 
 def _words(ds: xr.Dataset) -> list[str]:

@@ -81,12 +81,10 @@ def summary(result: xr.Dataset) -> dict[str, list[str]]:
         counts = _counts(result, "uncertified_because")
         lines += [f"  {count} not: {DOUBTS.get(name, name)}" for flag, name, count in counts if flag != CERTIFIED]
     if "settled" in result:
-        unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED, SEPARATING, JAMMED])
-        if unsettled.any():
+        unsettled = int(((result["settled"] == 0) & ~regime.isin([RIDING, FAILED, SEPARATING, JAMMED])).sum())
+        if unsettled:
             cells = np.count_nonzero(result["origin"] != INFERRED) if "origin" in result else regime.size
-            lines.append(
-                f"not settled: {int(unsettled.sum()) / cells:.1%} of the motions; a longer span may change them"
-            )
+            lines.append(f"not settled: {unsettled / cells:.1%} of the motions; a longer span may change them")
     if "audit" in result.attrs:
         lines.append(f"refined: {result.attrs['audit']}")
     bounds, diverging = [], 0
@@ -185,8 +183,8 @@ def _of_sample(result: xr.Dataset) -> dict[str, list[str]]:
     """The probability of each regime that occurs, with its interval; of several cells the range."""
     probability = result["probability"]
     cells = probability.size // result.sizes["word"]
-    lines = [f"cells: {cells}", f"sample: {result.attrs.get('sample')}"]
-    lines.append(f"interval: {result.attrs.get('sample_interval')}")
+    told = (f"{key.removeprefix('sample_')}: {result.attrs.get(key)}" for key in ("sample", "sample_interval"))
+    lines = [f"cells: {cells}", *told]
     grid = [dim for dim in probability.dims if dim != "word"]
     for word in map(str, result["word"].values):
         of = result.sel(word=word)
