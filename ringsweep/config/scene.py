@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import lru_cache
 from itertools import product
 from math import pi
 from types import MappingProxyType
@@ -79,9 +78,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     names, own, curve = _read_friction(doc, scene, model, laws)
     moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
-    known = law_choice(model, own).names
-    registered = MODELS[model], WITH_IMPACT.get(model), *map(LAWS.get, known), *DRIVES.values()
-    keys = _keys(model, known, tuple(own.items()), zones or ("zones.0",), moved, *registered)
+    keys = _Keys(moved, law_choice(model, own).names, own, zones or ("zones.0",))
     leaves = dict(keys.leaves(scene, names))
     if not names:
         section_of(scene, "friction", "scene.")
@@ -274,6 +271,23 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
         yield from (f"{section}.{key}" for key in keys)
 
 
+def structures_of(
+    model: str,
+    laws: Collection[str],
+    own: Mapping[str, type],
+    zones: tuple[str, ...],
+    drives: Iterable[str],
+    **rest: Any,
+) -> Iterator[Structure]:
+    """Structures that together have every number that a scene of a model can have, under some laws and some drives."""
+    # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take long.
+    taken = {*MODELS[model].laws, *own}
+    known = [law for law in laws if law in taken]
+    all_arcs = product(known, ("none",), ((), ("zone",), zones))
+    for law, drive, arcs in (*all_arcs, *((known[0], drive, ()) for drive in drives if drive in DRIVES)):
+        yield Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT, **rest)
+
+
 class _Keys:
     """Keys that a scene of a model can have, under some laws and some drives.
 
@@ -287,30 +301,17 @@ class _Keys:
 
     def __init__(
         self,
-        model: str,
+        moved: Structure,
         laws: Collection[str],
         own: Mapping[str, type] = MappingProxyType({}),
         zones: tuple[str, ...] = ("zones.0",),
-        moved: Structure | None = None,
         drives: Collection[str] = (*DRIVES, FORMULA),
     ):
-        self.model, self.moved, self.own, self.zones = model, moved, own, zones
-        paths = dict.fromkeys(path for drive in drives for path in _structural(model, drive, laws))
-        taken = {*MODELS[model].laws, *own}
-        known = [law for law in laws if law in taken]
-        common: dict[str, Any] = {
-            "impact": model in WITH_IMPACT,
-            "elsewhere": ELSEWHERE[0] if moved is None else moved.elsewhere,
-        }
-        # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take long.
-        for law, drive, arcs in (
-            *product(known, ("none",), ((), ("zone",), zones)),
-            *product(known[:1], (drive for drive in drives if drive in DRIVES), ((),)),
-        ):
-            one = Structure(model, law, drive, arcs, own_law=own.get(law), **common)
-            paths |= dict.fromkeys(parameters(one))
-        if moved is not None:
-            paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))
+        self.moved, self.own, self.zones = moved, own, zones
+        structures = [*structures_of(moved.model, laws, own, zones, drives, elsewhere=moved.elsewhere)]
+        structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
+        paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
+        paths |= dict.fromkeys(path for structure in structures for path in parameters(structure))
         self.known = set(paths)
         self.children: dict[str, dict[str, None]] = {}
         for path in paths:
@@ -349,15 +350,12 @@ class _Keys:
             if places := self.ending_with(key):
                 return f"; did you mean {places}?"
             for other in MODELS:
-                keys = _Keys(other, dict.fromkeys(MODELS[other].laws))
+                keys = _Keys(Structure(other, "", elsewhere=self.moved.elsewhere), MODELS[other].laws)
                 places = keys.ending_with(key)
-                if other != self.model and (places or key in keys.children.get(section, ())):
+                if other != self.moved.model and (places or key in keys.children.get(section, ())):
                     places = places or f"`{section}.{key}`".replace("`.", "`")
-                    return f": model {other} has {places}, this is model {self.model}"
-        near = self
-        if self.moved is not None:
-            laws = laws or dict.fromkeys(MODELS[self.model].laws)
-            near = _Keys(self.model, laws, self.own, self.zones[:1], self.moved, (self.moved.drive,))
+                    return f": model {other} has {places}, this is model {self.moved.model}"
+        near = _Keys(self.moved, laws or MODELS[self.moved.model].laws, self.own, self.zones[:1], (self.moved.drive,))
         known = near.children.get(section, self.children[section])
         numbers = [name for name in known if name != "law"]
         # The only number of a section is the one that is meant, whatever it is called.

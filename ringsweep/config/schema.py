@@ -14,13 +14,13 @@ from ringsweep.config.follow import KEYS as FOLLOW
 from ringsweep.config.own import FORMULA, LAW_KEYS, TABLE_LAW
 from ringsweep.config.record import RECORD, SECTION
 from ringsweep.config.refine import KEYS as REFINE
-from ringsweep.config.scene import as_named
+from ringsweep.config.scene import structures_of
 from ringsweep.config.sections import Keys
 from ringsweep.config.solver import options_of
 from ringsweep.config.tables import INTERPOLATIONS, TABLES
 from ringsweep.config.uncertain import KEYS as SAMPLE
-from ringsweep.models import MODELS, WITH_IMPACT, parameters
-from ringsweep.models.scene import LAW, Structure
+from ringsweep.models import MODELS, parameters
+from ringsweep.models.scene import ELSEWHERE, LAW
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.formula import COEFFICIENTS
@@ -36,19 +36,14 @@ def schema() -> dict[str, Any]:
     Editors complete and explain keys from it. It checks no units and no contradictions between values, as
     :func:`ringsweep.config.configuration.load` does.
     """
-    known: dict[str, list[Parameter]] = {}
-    for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",))):
-        for law in (*MODELS[model].laws, TABLE_LAW):
-            own = Table if law == TABLE_LAW else None
-            structure = Structure(model, law, drive, arcs, own_law=own, impact=model in WITH_IMPACT)
+    known: dict[str, dict[Parameter, None]] = {}
+    for model, name in product(MODELS, ELSEWHERE):
+        laws = *MODELS[model].laws, TABLE_LAW
+        for structure in structures_of(model, laws, {TABLE_LAW: Table}, ("zones.0",), DRIVES, elsewhere=name):
             for path, parameter in parameters(structure).items():
                 # All zones of a list have one description.
                 parameter = dataclasses.replace(parameter, long_name=parameter.long_name.replace("zone 1", "the zone"))
-                meanings = known.setdefault(path, [])
-                if parameter not in meanings:
-                    meanings.append(parameter)
-    for path in [path for path in known if path.startswith("friction.rest.")]:
-        known[as_named(path, "elsewhere")] = known[path]
+                known.setdefault(path, {})[parameter] = None
     leaves = {path: _any(*map(_number, meanings)) for path, meanings in known.items()}
     tables = {f"{of}.{name}": _list(_number(p)) for of, columns in TABLES.items() for name, p in columns.items()}
     for of, columns in TABLES.items():
