@@ -97,7 +97,7 @@ class Sample:
     Attributes
     ----------
     factors : tuple of Factor
-        In an order in which those that are multiplied by others come after them.
+        Those that are multiplied by others come after them.
     n : int
         Points for each cell.
     method : str
@@ -229,11 +229,10 @@ def _check_number(method: str, n: int, replicates: int) -> None:
 
 
 def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
-    """Factors, each after the one that it is multiplied by."""
+    """Factors, those that are multiplied by others behind them."""
     if not isinstance(given, dict) or not given:
         raise InputError("sweep.sample.of", f"a section of paths and distributions is expected, got {show(given)}")
-    known = sweepable(scene)
-    left: dict[str, Factor] = {}
+    known, drawn, found = sweepable(scene), set[str](), list[Factor]()
     for key, spec in given.items():
         where = f"sweep.sample.of.{key}"
         parameters = {path: swept_parameter(known, path, where) for path in paths_of(key)}
@@ -242,25 +241,18 @@ def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
                 raise InputError(where, f"a {parameter.long_name} has no distribution: make it an axis of sweep.grid")
             if path in axes.columns:
                 raise InputError(where, "also an axis of the sweep: a path can vary in one place only")
-            if any(path in other.paths for other in left.values()):
+            if path in drawn:
                 raise InputError(where, f"{path} is drawn twice")
-        left[where] = _factor(spec, parameters, where, known)
-    found: list[Factor] = []
-    while left:
-        drawn = {path for factor in left.values() for path in factor.paths}
-        ready = {where: factor for where, factor in left.items() if factor.over not in drawn}
-        if not ready:
-            where, factor = next(iter(left.items()))
-            raise InputError(f"{where}.over", f"{factor.over} is itself drawn over {factor.paths[0]}")
-        found += ready.values()
-        left = {where: factor for where, factor in left.items() if where not in ready}
-    valued = {*scene.values, *axes.columns, *(path for factor in found for path in factor.paths)}
-    for factor in found:
-        if factor.over is not None and factor.over not in valued:
-            raise InputError(
-                f"sweep.sample.of.{factor.name}.over", f"{factor.over} has no value in the scene, and no distribution"
-            )
-    return tuple(found)
+            drawn.add(path)
+        found.append(_factor(spec, parameters, where, known))
+    ratios = {factor.name: factor.over for factor in found if factor.over is not None}
+    for name, over in ratios.items():
+        where = f"sweep.sample.of.{name}.over"
+        if over in ratios:
+            raise InputError(where, f"{over} is itself drawn over {ratios[over]}: name the number behind both")
+        if over not in {*scene.values, *axes.columns, *drawn}:
+            raise InputError(where, f"{over} has no value in the scene, and no distribution")
+    return tuple(sorted(found, key=lambda factor: factor.over is not None))
 
 
 def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping[str, Parameter | Choice]) -> Factor:
@@ -411,14 +403,11 @@ def _check_points(sample: Sample, scene: Scene, axes: Axes) -> None:
                 unit, share = after_number(parameter.unit), "a ratio that draws it is not allowed"
                 if factor.over is None:
                     drawn = distribution(factor.kind, *factor.numbers)
-                    share = (
-                        f"{factor} has probability {drawn.cdf(parameter.lower) + drawn.sf(parameter.upper):.2g} of that"
-                    )
-                raise InputError(
-                    f"sweep.sample.of.{factor.name}",
-                    f"draws {wrong:.3g}{unit}, but {parameter.long_name} must be {parameter.interval}{unit}: "
-                    f"{share} (truncnormal and uniform have ends)",
-                )
+                    outside = drawn.cdf(parameter.lower) + drawn.sf(parameter.upper)
+                    share = f"{factor} has probability {outside:.2g} of that"
+                must = f"{parameter.long_name} must be {parameter.interval}{unit}"
+                problem = f"draws {wrong:.3g}{unit}, but {must}: {share} (truncnormal and uniform have ends)"
+                raise InputError(f"sweep.sample.of.{factor.name}", problem)
     try:
         check_consistency(scene, found)
     except InputError as error:
