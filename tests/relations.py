@@ -17,8 +17,7 @@ import numpy as np
 import xarray as xr
 
 import ringsweep
-from ringsweep.config.own import own_drive, own_force
-from ringsweep.config.tables import TABLES
+from ringsweep.config.own import TABLES, own_drive, own_force
 from ringsweep.models import parameters
 from ringsweep.models.scene import Structure
 from ringsweep.quantities.parameters import Parameter

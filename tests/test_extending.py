@@ -281,7 +281,7 @@ def test_incomplete_file_is_refused_in_one_line_that_names_what_is_missing(tmp_p
         paths += [path for path in files_in(folder, [(name, old, new)]) if path.name == name]
     script = f"""
         from pathlib import Path
-        from ringsweep.config.own_files import load_own_files
+        from ringsweep.config.own import load_own_files
         for path in {list(map(str, paths))}:
             try:
                 load_own_files([Path(path)])

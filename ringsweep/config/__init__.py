@@ -7,7 +7,7 @@ from ringsweep.config.configuration import Setting as Setting
 from ringsweep.config.configuration import load as load
 from ringsweep.config.configuration import tell_unit as tell_unit
 from ringsweep.config.configuration import with_values as with_values
-from ringsweep.config.own_files import load_own_files
+from ringsweep.config.own import load_own_files
 from ringsweep.config.scene import as_named as as_named
 from ringsweep.config.scene import sweepable as sweepable
 

@@ -10,9 +10,12 @@ from math import pi
 from types import MappingProxyType
 from typing import Any
 
+from ringsweep.config.options import read_record
 from ringsweep.config.own import (
     FORMULA,
+    INTERPOLATIONS,
     TABLE_LAW,
+    TABLES,
     keep_definitions,
     law_of_curve,
     laws_with,
@@ -20,10 +23,9 @@ from ringsweep.config.own import (
     own_force,
     own_laws,
     read_curve,
+    read_samples,
 )
-from ringsweep.config.record import read_record
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion, warn_once
-from ringsweep.config.tables import INTERPOLATIONS, TABLES, read_samples
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters

@@ -11,13 +11,11 @@ from typing import Any
 
 from ringsweep.config.axes import COUNT
 from ringsweep.config.follow import KEYS as FOLLOW
-from ringsweep.config.own import FORMULA, LAW_KEYS, TABLE_LAW
-from ringsweep.config.record import RECORD, SECTION
+from ringsweep.config.options import RECORD, SECTION, options_of
+from ringsweep.config.own import FORMULA, INTERPOLATIONS, LAW_KEYS, TABLE_LAW, TABLES
 from ringsweep.config.refine import KEYS as REFINE
 from ringsweep.config.scene import structures_of
 from ringsweep.config.sections import Keys
-from ringsweep.config.solver import options_of
-from ringsweep.config.tables import INTERPOLATIONS, TABLES
 from ringsweep.config.uncertain import KEYS as SAMPLE
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import ELSEWHERE, LAW
