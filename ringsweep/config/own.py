@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.sections import Key, Keys, one_of, read_keys, read_values, warn_once
+from ringsweep.config.sections import Key, Keys, choose, one_of, read_keys, read_values, section_of, warn_once
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name, shortened
 from ringsweep.models import MODELS
+from ringsweep.models.scene import LAW
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, TRAITS, add_law, laws
 from ringsweep.physics.friction.formula import FRICTION, FormulaError
 from ringsweep.physics.friction.laws import Definition, define
-from ringsweep.quantities.parameters import Parameter, declared
+from ringsweep.quantities.parameters import Choice, Parameter, declared
 from ringsweep.quantities.units import show
 
 #: Name of the law that the section ``friction`` defines by ``mu`` and ``at_rest``, and of the drive by ``theta``.
@@ -119,32 +120,52 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
     return found
 
 
-def read_curve(doc: Document, friction: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Speeds and friction coefficients of a table; see :func:`ringsweep.config.tables.read_table`.
+def law_choice(model: str, own: Mapping[str, type]) -> Choice:
+    """Friction laws that a model takes, and those that the configuration defines."""
+    return Choice("friction law", tuple(dict.fromkeys([*MODELS[model].laws, *own, FORMULA, TABLE_LAW])))
+
+
+def read_laws(
+    doc: Document, scene: dict[str, Any], model: str, swept: tuple[str, Any] | None
+) -> tuple[list[str], dict[str, type], Any]:
+    """Laws that are used, types of those that the configuration or the process defines, and a measured curve.
+
+    Parameters
+    ----------
+    doc : Document
+    scene : dict
+    model : str
+    swept : tuple of str and sequence, optional
+        Laws that the sweep gives: their place in the configuration, and their names.
 
     Raises
     ------
     InputError
-        If the table is missing, or cannot be a friction law.
+        If a law is unknown, or its definition is wrong.
     """
-    speeds, mu = read_table(doc, friction, "friction", 2)
-    if not mu.any():
-        raise InputError("scene.friction.mu", "all coefficients are 0")
-    return speeds, mu
-
-
-def law_of_curve(curve: tuple[NDArray[np.float64], NDArray[np.float64]]) -> type:
-    """Type of the law: set-valued at rest if friction does not vanish there."""
-    return laws.Table if curve[1][0] > 0.0 else laws.SmoothTable
-
-
-def keep_definitions(friction: dict[str, Any], names: list[str]) -> None:
-    """Put the formulas of laws that this process has defined into the section, so that a file contains them."""
+    section = section_of(scene, "friction", "scene.") if "friction" in scene else {}
+    own = own_laws(section)
+    known, names, curve = law_choice(model, own), list[str](), None
+    if "law" in section:
+        # Name a wrong law, rather than the parameters that only this law has.
+        names = [choose(dict.fromkeys(known.names), section, f"scene.{LAW}", f"friction law of model {model}")]
+    if swept is not None:
+        names = read_values(swept[1], known, swept[0]).tolist()
+    if FORMULA in names and FORMULA not in own:
+        raise InputError("scene.friction.mu", "missing: the formula of the friction coefficient")
+    if TABLE_LAW in names:
+        curve = read_table(doc, section, "friction", 2)
+        if not curve[1].any():
+            raise InputError("scene.friction.mu", "all coefficients are 0")
+        # Set-valued at rest, if friction does not vanish there.
+        own[TABLE_LAW] = laws.Table if curve[1][0] > 0.0 else laws.SmoothTable
     for name in names:
-        if name in _REGISTERED and name not in friction.get("laws", {}):
+        # A file contains the formulas of laws that this process has defined: other processes know only these.
+        if name in _REGISTERED and name not in section.get("laws", {}):
             definition = dataclasses.asdict(_REGISTERED[name])
             kept = {key: value for key, value in definition.items() if value is not None}
-            friction["laws"] = {**friction.get("laws", {}), name: kept}
+            section["laws"] = {**section.get("laws", {}), name: kept}
+    return names, own | own_laws(section), curve
 
 
 def own_drive(model: str, drive: Mapping[str, Any]) -> type | None:
@@ -173,7 +194,7 @@ def own_force(force: Any) -> type | None:
     """
     if not isinstance(force, Mapping) or "formula" not in force:
         return None
-    for key in (*TABLES["force"], "file", "interpolate"):
+    for key in TABLE_KEYS["force"]:
         if key in force:
             raise InputError(f"scene.force.{key}", "cannot stand beside a formula: give one of them")
     return _defined(lambda: drives.define(force["formula"], "N"), {"mu": ("scene.force.formula", force["formula"])})
@@ -220,6 +241,9 @@ INTERPOLATIONS = {
         "linear": "straight lines",
     },
 }
+
+#: Keys of a section that stand for a table, by section.
+TABLE_KEYS = {of: (*columns, "file", *["interpolate"] * (of in INTERPOLATIONS)) for of, columns in TABLES.items()}
 
 # Share of the range of a table that a spline through it may leave; a sine with six rows a period leaves less.
 _OVERSHOOT = 0.1

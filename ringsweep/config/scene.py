@@ -13,19 +13,16 @@ from typing import Any
 from ringsweep.config.options import read_record
 from ringsweep.config.own import (
     FORMULA,
-    INTERPOLATIONS,
+    TABLE_KEYS,
     TABLE_LAW,
-    TABLES,
-    keep_definitions,
-    law_of_curve,
+    law_choice,
     laws_with,
     own_drive,
     own_force,
-    own_laws,
-    read_curve,
+    read_laws,
     read_samples,
 )
-from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion, warn_once
+from ringsweep.config.sections import choose, missing_text, section_of, suggestion, warn_once
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
@@ -77,7 +74,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     exponent, section = read_record(doc.tree.get("record", {}), model)
     elsewhere = _name_elsewhere(scene, swept)
     zones = _zones(scene)
-    names, own, curve = _read_friction(doc, scene, model, laws)
+    names, own, curve = read_laws(doc, scene, model, laws)
     moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
     keys = _Keys(moved, law_choice(model, own).names, own, zones or ("zones.0",))
@@ -90,7 +87,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     moved = replace(moved, exponent=exponent, section=section, arcs=_arcs(scene, zones, leaves))
     if moved.drive == "table":
         moved = replace(moved, table=read_samples(doc, scene["drive"], "drive"))
-    if any(f"force.{name}" in leaves for name in (*TABLES["force"], "file", "interpolate")):
+    if any(f"force.{name}" in leaves for name in TABLE_KEYS["force"]):
         moved = replace(moved, force=read_samples(doc, scene["force"], "force"))
     structures = {
         law: replace(moved, law=law, own_law=own.get(law), curve=curve if law == TABLE_LAW else None) for law in names
@@ -144,29 +141,6 @@ def _arcs(scene: dict[str, Any], zones: tuple[str, ...], leaves: Collection[str]
     if rough:
         raise InputError(f"scene.{rough[0]}", "there is no zone: give zone, or leave friction.rough out")
     return ()
-
-
-def _read_friction(
-    doc: Document, scene: dict[str, Any], model: str, laws: tuple[str, Any] | None
-) -> tuple[list[str], dict[str, type], Any]:
-    """Laws that are used, types of those that the configuration or the process defines, and a measured curve."""
-    section = section_of(scene, "friction", "scene.") if "friction" in scene else {}
-    own = own_laws(section)
-    known = law_choice(model, own)
-    names = []
-    if "law" in section:
-        # Name a wrong law, rather than the parameters that only this law has.
-        names = [choose(dict.fromkeys(known.names), section, f"scene.{LAW}", f"friction law of model {model}")]
-    if laws is not None:
-        names = read_values(laws[1], known, laws[0]).tolist()
-    if FORMULA in names and FORMULA not in own:
-        raise InputError("scene.friction.mu", "missing: the formula of the friction coefficient")
-    curve = read_curve(doc, section) if TABLE_LAW in names else None
-    if curve is not None:
-        own[TABLE_LAW] = law_of_curve(curve)
-    keep_definitions(section, names)
-    # Laws of this process too: other processes know only what the structure holds.
-    return names, own | own_laws(section), curve
 
 
 def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> Structure:
@@ -255,11 +229,6 @@ def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
     return found
 
 
-def law_choice(model: str, own: Mapping[str, type]) -> Choice:
-    """Friction laws that a model takes, and those that the configuration defines."""
-    return Choice("friction law", tuple(dict.fromkeys([*MODELS[model].laws, *own, FORMULA, TABLE_LAW])))
-
-
 def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
     """Paths of a scene that are no numeric parameters."""
     yield from ("model", LAW, "drive.law", "friction.laws")
@@ -268,9 +237,7 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
     by_formula |= {"drive.theta": drive == FORMULA, "force.formula": takes_force}
     yield from (path for path, is_used in by_formula.items() if is_used)
     by_table = {"drive": drive == "table", "force": takes_force, "friction": TABLE_LAW in laws}
-    for section in (section for section, is_used in by_table.items() if is_used):
-        keys = *TABLES[section], "file", *(["interpolate"] if section in INTERPOLATIONS else [])
-        yield from (f"{section}.{key}" for key in keys)
+    yield from (f"{of}.{key}" for of, keys in TABLE_KEYS.items() if by_table[of] for key in keys)
 
 
 def structures_of(
