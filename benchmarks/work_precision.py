@@ -51,7 +51,7 @@ from benchmarks._common import (
 from benchmarks.peers import in_c
 from benchmarks.peers.physics import Law
 from ringsweep import plots
-from ringsweep.cli.precision_table import table as rows_of
+from ringsweep.report.precision import table as rows_of
 from ringsweep.runs.contenders import Answer, Contender, compete, fastest
 
 SEED, SIDE = 181, 64

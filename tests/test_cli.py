@@ -484,6 +484,16 @@ def test_json_of_run_and_info_has_the_counts_and_nothing_else_on_stdout(folder, 
     assert json.loads(capsys.readouterr().out) == found
 
 
+def test_json_of_a_sample_has_its_probabilities_as_numbers(folder, capsys):
+    sample = "\n  sample: {n: 8, method: random, of: {drive.amplitude: {uniform: [0.5, 10]}}}\n"
+    (folder / "case.yaml").write_text(TEXT.partition("\nsweep:")[0] + "\nsweep:" + sample)
+    assert main(["run", "case.yaml", "--json", "--jobs", "1"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert sum(found["probability"].values()) == pytest.approx(1.0)
+    for word, share in found["probability"].items():
+        assert found["probability_low"][word] <= share <= found["probability_high"][word]
+
+
 def test_simulate_takes_a_cell_of_a_file(folder, capsys):
     assert main(["run", "case.yaml", "--jobs", "1"]) == 0
     assert main(["simulate", "case.nc", "--sel", "drive.amplitude=1", "--set", "time.span=1"]) == 0

@@ -1,5 +1,6 @@
 """Measurement of error against run time, and the recommended solver."""
 
+import json
 from math import acos, pi, sqrt
 from pathlib import Path
 
@@ -10,10 +11,11 @@ from belts import on_belt, with_all_parts
 
 import ringsweep
 from ringsweep.cli import main
-from ringsweep.cli.precision_table import report
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import PRECISION
+from ringsweep.report.precision import report
+from ringsweep.report.text import as_json
 from ringsweep.runs import precision
 from ringsweep.storage import netcdf
 
@@ -144,6 +146,7 @@ class TestErrors:
 class TestRecommendation:
     def test_recommended_solver_meets_the_target_when_run_again(self, found, config):
         line = report(found).splitlines()[-1]
+        assert json.loads(as_json(found))["summary"]["precision"][-1] == line
         solver = yaml.safe_load(line)["solver"]
         assert line == f"solver: {{{found.attrs['recommended']}}}"
         again = rerun(found, config, ", ".join(f"{name}: {value}" for name, value in solver.items()))

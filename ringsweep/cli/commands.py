@@ -305,12 +305,12 @@ def precision_command(arguments: argparse.Namespace) -> None:
     name = arguments.output or f"{load(arguments.config).name}-precision.nc"
     target, picture = _outputs(name, "contender", "error against run time")
 
-    from ringsweep.cli.precision_table import report
+    from ringsweep.report.text import in_lines
 
     given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
     options = {name: value for name, value in given.items() if value is not None}
     result = ringsweep.precision(arguments.config, **options, progress=not arguments.quiet)
-    _store(result, target, picture, report(result), "work_precision")
+    _store(result, target, picture, in_lines(result), "work_precision")
 
 
 def info_command(arguments: argparse.Namespace) -> None:
@@ -364,6 +364,7 @@ def _print_summary(name: str, result: Any) -> None:
 
     from ringsweep.quantities.quantity import after_number
     from ringsweep.quantities.variables import in_unit, written_unit
+    from ringsweep.report.text import in_lines
 
     configuration = json.loads(result.attrs.get("configuration", "{}"))
     print(result.attrs.get("title", name))
@@ -381,16 +382,7 @@ def _print_summary(name: str, result: Any) -> None:
             print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{unit}")
     if not {"contender", "time"} & set(result.dims):
         print("variables:", ", ".join(map(str, result.data_vars)))
-    if "contender" in result.dims:
-        from ringsweep.cli.precision_table import report
-
-        print(report(result))
-    elif "fit_report" in result.attrs:
-        print(result.attrs["fit_report"])
-    else:
-        from ringsweep.report.text import in_lines
-
-        print(in_lines(result))
+    print(in_lines(result))
     print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))
     if "own_files" in result.attrs:
         print("own files:", result.attrs["own_files"], "(RINGSWEEP_LAWS must name them to run it again)")

@@ -28,7 +28,7 @@ def in_lines(result: xr.Dataset) -> str:
 
 
 def as_json(result: xr.Dataset) -> str:
-    """What a result says, as JSON: its lines by what they are about, and the cells of each class, or thresholds."""
+    """What a result says, as JSON: its lines by topic, and cells of each class, probabilities or thresholds."""
     found: dict[str, Any] = {"title": result.attrs.get("title"), "dimensions": dict(result.sizes)}
     found["summary"] = {topic: [line.strip() for line in lines] for topic, lines in summary(result).items()}
     if "threshold_path" in result.attrs:
@@ -38,6 +38,9 @@ def as_json(result: xr.Dataset) -> str:
     else:
         flagged = [str(name) for name, data in result.data_vars.items() if is_classification(data)]
         found["counts"] = {name: {word: count for _, word, count in _counts(result, name)} for name in flagged}
+        for name in (str(name) for name in result.data_vars if str(name).startswith("probability")):
+            # In the shape of the grid: of one cell a number.
+            found[name] = {word: result[name].sel(word=word).values.tolist() for word in result["word"].values.tolist()}
     # JSON has no infinity.
     return re.sub(r"(?<=: )-?Infinity|(?<=: )NaN", "null", json.dumps(found, indent=2, ensure_ascii=False))
 
@@ -54,6 +57,12 @@ def summary(result: xr.Dataset) -> dict[str, list[str]]:
         from ringsweep.runs.thresholds import in_words
 
         return {"thresholds": in_words(result).splitlines()}
+    if "contender" in result.dims:
+        from ringsweep.report.precision import report
+
+        return {"precision": report(result).splitlines()}
+    if "fit_report" in result.attrs:
+        return {"fit": result.attrs["fit_report"].splitlines()}
     if "vertex" in result.dims:
         curves, points = len(np.unique(result["line"])), result.sizes["vertex"]
         within = f", each within {result['error'].values.max():.2g} along its axis" if points else ""
