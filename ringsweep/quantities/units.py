@@ -8,6 +8,7 @@ import re
 import reprlib
 from functools import cache, lru_cache
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 from ringsweep.errors import InputError, shortened
@@ -26,32 +27,6 @@ _LONGEST = 100
 
 #: Integers from here on are no values of a configuration.
 LONG_INTEGER = 10**_LONGEST
-
-# Pint's own registry takes the radian as dimensionless: 5 Hz would become 5 rad/s, and 30 rpm 3.14 Hz.
-_UNITS = """
-kilo- = 1e3 = k-
-mega- = 1e6 = M-
-centi- = 1e-2 = c-
-milli- = 1e-3 = m-
-micro- = 1e-6 = µ- = μ- = u-
-nano- = 1e-9 = n-
-meter = [length] = m = metre
-second = [time] = s = sec
-gram = [mass] = g
-radian = [angle] = rad
-degree = 0.017453292519943295 radian = deg = °
-turn = 6.283185307179586 radian = _ = rev = revolution
-minute = 60 second = min
-hour = 3600 second = h
-revolutions_per_minute = turn / minute = rpm
-hertz = 1 / second = Hz
-newton = kilogram * meter / second ** 2 = N
-joule = newton * meter = J
-percent = 0.01 = %
-inch = 0.0254 meter = in
-foot = 0.3048 meter = ft
-pound = 0.45359237 kilogram = lb
-"""
 
 
 def quantity(value: Any, parameter: Parameter, path: str) -> float:
@@ -289,7 +264,7 @@ def _pint() -> Any:
 
 @cache
 def _registry() -> Any:
-    return _pint().UnitRegistry(_UNITS.strip().splitlines())
+    return _pint().UnitRegistry(Path(__file__).with_name("units.txt").read_text(encoding="utf-8").splitlines())
 
 
 def _in_pi(angle: float) -> str:

@@ -105,6 +105,31 @@ _STATEMENT = "a statement about the span of the run, not about all times; "
 CONTACTS = ("none", "contact_1", "contact_2", "both")
 
 
+HISTORY: dict[str, Variable] = {
+    "phi": Variable("rad", "angle of the body"),
+    "omega": Variable("rad/s", "angular velocity of the body"),
+    "epsilon": Variable("rad/s^2", "angular acceleration of the body"),
+    "normal_1": Variable("N", "normal reaction at contact 1"),
+    "normal_2": Variable("N", "normal reaction at contact 2"),
+    "ring_omega": Variable("rad/s", "angular velocity of the ring"),
+    "theta": Variable("rad", "angle of the ring"),
+    "zone_1": Variable("1", "segment of the ring under contact 1", dtype="int32"),
+    "zone_2": Variable("1", "segment of the ring under contact 2", dtype="int32"),
+    "x": Variable("m", "displacement of the body"),
+    "velocity": Variable("m/s", "velocity of the body"),
+    "belt_x": Variable("m", "displacement of the belt"),
+    "belt_velocity": Variable("m/s", "velocity of the belt"),
+    "friction_force": Variable("N", "friction force"),
+    "force": Variable("N", "applied force on the body"),
+    "deflection": Variable("m", "deflection of the bristles"),
+    "deflection_1": Variable("m", "deflection of the bristles at contact 1"),
+    "deflection_2": Variable("m", "deflection of the bristles at contact 2"),
+    "mode": classes("friction mode", MODES),
+    "y": Variable("m", "height of the centre of mass above the axis"),
+    "gap_1": Variable("m", "gap of contact 1"),
+    "gap_2": Variable("m", "gap of contact 2"),
+}
+
 OUTCOMES: dict[str, Variable] = {
     "regime": classes("regime of the run", REGIMES, _STATEMENT + explained(DEFINITIONS)),
     "motion": classes(
@@ -163,17 +188,6 @@ OUTCOMES: dict[str, Variable] = {
     "multiplier_2": Variable("1", "second largest magnitude of the Floquet multipliers of the periodic motion"),
     "multiplier_angle_1": Variable("rad", "argument of the largest Floquet multiplier of the periodic motion"),
     "multiplier_angle_2": Variable("rad", "argument of the second largest Floquet multiplier of the periodic motion"),
-    "x_section": Variable("m", "displacement of the body at the points of its section", dims=("section",)),
-    "velocity_section": Variable("m/s", "velocity of the body at the points of its section", dims=("section",)),
-    "deflection_section": Variable("m", "deflection of the bristles at the points of the section", dims=("section",)),
-    "phi_section": Variable("rad", "angle of the body at the points of its section, from -pi to pi", dims=("section",)),
-    "omega_section": Variable("rad/s", "angular velocity of the body at the points of its section", dims=("section",)),
-    "deflection_1_section": Variable(
-        "m", "deflection of the bristles at contact 1 at the points of the section", dims=("section",)
-    ),
-    "deflection_2_section": Variable(
-        "m", "deflection of the bristles at contact 2 at the points of the section", dims=("section",)
-    ),
     "open_time": Variable("s", "time for which a contact is open"),
     "flight_time": Variable("s", "time for which no contact holds"),
     "gap_max": Variable("m", "greatest gap of a contact"),
@@ -205,7 +219,15 @@ OUTCOMES: dict[str, Variable] = {
 }
 
 #: Outcomes that are the points of a section, place and velocity first.
-POINTS = tuple(name for name, variable in OUTCOMES.items() if "section" in variable.dims)
+POINTS = tuple(
+    f"{name}_section" for name in ("x", "velocity", "deflection", "phi", "omega", "deflection_1", "deflection_2")
+)
+
+for _point in POINTS:
+    _of = HISTORY[_point.removesuffix("_section")]
+    _where = ", from -pi to pi, at" if _point == "phi_section" else " at"
+    _name = f"{_of.long_name}{_where} the points of its section"
+    OUTCOMES[_point] = replace(_of, long_name=_name, dims=("section",))
 
 #: Classifications that a refined sweep infers.
 LABELS = ("regime", "motion", "separating_contact", "aftermath")
@@ -233,57 +255,25 @@ def error_attribute(name: str, columns: Collection[str]) -> dict[str, str]:
     return {"ancillary_variables": error} if error in columns else {}
 
 
-def _with_ends(name: str, about: str) -> dict[str, Variable]:
-    """A number, and the ends of its interval."""
-    ends = {
-        f"{name}_{end}": Variable("1", f"{side} end of the 95 % interval: {about}")
-        for end, side in (("low", "lower"), ("high", "upper"))
-    }
-    return {name: Variable("1", about), **ends}
-
-
-_SHARE, _INDEX = "probability of each regime", "Sobol index of the indicator of each regime"
+_INDEX = "Sobol index of the indicator of each regime"
 
 #: Variables of each cell of a sampled sweep.
 SAMPLED: dict[str, Variable] = {
-    **_with_ends("probability", _SHARE),
+    "probability": Variable("1", "probability of each regime", comment=_STATEMENT + explained(DEFINITIONS)),
     "probability_numerics": Variable("1", "part of the length of the interval that runs without certificate add"),
     "runs": Variable("1", "runs of each replicate, without and with certificate", dtype="int32"),
-    **_with_ends("survival", "survival"),
-    **_with_ends("sobol_first", f"first {_INDEX}"),
-    **_with_ends("sobol_total", f"total {_INDEX}"),
-    # What differs from the ends of the interval.
-    "probability": Variable("1", _SHARE, comment=_STATEMENT + explained(DEFINITIONS)),
     "survival": Variable("1", "probability that a contact still holds, or that a body still rides"),
+    "sobol_first": Variable("1", f"first {_INDEX}"),
+    "sobol_total": Variable("1", f"total {_INDEX}"),
+}
+SAMPLED |= {
+    f"{name}_{end}": Variable("1", f"{side} end of the 95 % interval: {SAMPLED[name].long_name}")
+    for name in ("probability", "survival", "sobol_first", "sobol_total")
+    for end, side in (("low", "lower"), ("high", "upper"))
 }
 
 #: What a quantile, and the ends of its 95 % interval, are called, by the end of the name of their variable.
 QUANTILE_ENDS = {"": "quantile", "_low": "lower end of a quantile", "_high": "upper end of a quantile"}
-
-HISTORY: dict[str, Variable] = {
-    "phi": Variable("rad", "angle of the body"),
-    "omega": Variable("rad/s", "angular velocity of the body"),
-    "epsilon": Variable("rad/s^2", "angular acceleration of the body"),
-    "normal_1": Variable("N", "normal reaction at contact 1"),
-    "normal_2": Variable("N", "normal reaction at contact 2"),
-    "ring_omega": Variable("rad/s", "angular velocity of the ring"),
-    "theta": Variable("rad", "angle of the ring"),
-    "zone_1": Variable("1", "segment of the ring under contact 1", dtype="int32"),
-    "zone_2": Variable("1", "segment of the ring under contact 2", dtype="int32"),
-    "x": Variable("m", "displacement of the body"),
-    "velocity": Variable("m/s", "velocity of the body"),
-    "belt_x": Variable("m", "displacement of the belt"),
-    "belt_velocity": Variable("m/s", "velocity of the belt"),
-    "friction_force": Variable("N", "friction force"),
-    "force": Variable("N", "applied force on the body"),
-    "deflection": Variable("m", "deflection of the bristles"),
-    "deflection_1": Variable("m", "deflection of the bristles at contact 1"),
-    "deflection_2": Variable("m", "deflection of the bristles at contact 2"),
-    "mode": classes("friction mode", MODES),
-    "y": Variable("m", "height of the centre of mass above the axis"),
-    "gap_1": Variable("m", "gap of contact 1"),
-    "gap_2": Variable("m", "gap of contact 2"),
-}
 
 #: What happens to the contacts in an event, by its number in histories.
 EVENTS = {1: "separation", 2: "rebound", 3: "closure"}
