@@ -282,16 +282,3 @@ def test_name_with_control_characters_is_refused_and_shown_escaped():
     with pytest.raises(InputError) as refused:
         files.check_writable("red\x1b[31m\nx.nc")
     assert str(refused.value) == r"red\x1b[31m\nx.nc: the name has control characters: choose another one"
-
-
-def test_umask_that_forbids_reading_the_output_is_told_and_leaves_nothing(tmp_path):
-    before = os.umask(0o777)
-    try:
-        with (
-            pytest.raises(InputError, match="the umask of this shell forbids you to read"),
-            replacing(tmp_path / "a.nc"),
-        ):
-            pass
-    finally:
-        os.umask(before)
-    assert not list(tmp_path.iterdir())

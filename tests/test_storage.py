@@ -1,6 +1,5 @@
 """Result files: written completely or not at all, and read back unchanged."""
 
-import json
 import os
 import stat
 
@@ -56,17 +55,6 @@ def test_no_variable_has_a_fill_value_and_large_variables_are_compressed(sweep, 
         assert file["regime"].filters()["zlib"]
         assert not file["zone_half_angle"].filters()["zlib"]
         assert file["zone_half_angle"].units == "rad"
-
-
-def test_attributes_without_a_netcdf_type_are_written_as_json(sweep, tmp_path):
-    sweep.attrs |= {"fresh": True, "seed": None, "scene": {"body": {"mass": np.float64(0.076)}}, "tags": ["a", "b"]}
-    netcdf.save(sweep, tmp_path / "out.nc")
-    attributes = netcdf.load(tmp_path / "out.nc").attrs
-    assert json.loads(attributes["fresh"]) is True
-    assert json.loads(attributes["seed"]) is None
-    assert json.loads(attributes["scene"]) == {"body": {"mass": 0.076}}
-    assert json.loads(attributes["tags"]) == ["a", "b"]
-    assert sweep.attrs["fresh"] is True, "saving must not change the dataset in memory"
 
 
 @pytest.mark.parametrize("failure", [OSError("disk full"), KeyboardInterrupt()])

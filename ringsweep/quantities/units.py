@@ -83,29 +83,23 @@ def spelled(value: Any) -> Any:
     """
     if not is_quantity(value):
         return value
-    if not _is_known(unit := f"{value.units:C}"):
-        # Units that are not known here, such as pounds-force, have roots that are: gram, meter, second, radian.
-        # Logarithmic units may have none, and huge integers no conversion: both are refused later.
-        with contextlib.suppress(_pint().PintError, OverflowError):
-            value = value.to_root_units()
-            unit = f"{value.units:C}"
+    unit = f"{value.units:C}"
+    # A ValueError means another dimension.
+    with contextlib.suppress(ValueError):
+        try:
+            _factor(unit, "1")
+        except LookupError:
+            # Units that are not known here, such as pounds-force, have roots that are: gram, meter, second, radian.
+            # Logarithmic units may have none, and huge integers no conversion: both are refused later.
+            with contextlib.suppress(_pint().PintError, OverflowError):
+                value = value.to_root_units()
+                unit = f"{value.units:C}"
     magnitude = value.magnitude
 
     def text(number: Any) -> Any:
         return [text(part) for part in number] if isinstance(number, list) else f"{number} {unit or 'dimensionless'}"
 
     return text(magnitude.tolist() if hasattr(magnitude, "tolist") else magnitude)
-
-
-@lru_cache(maxsize=256)
-def _is_known(unit: str) -> bool:
-    """Whether a unit is one that configurations may use."""
-    try:
-        _factor(unit, "1")
-    except (LookupError, ValueError) as error:
-        # It has another dimension.
-        return isinstance(error, ValueError)
-    return True
 
 
 def percent_at_most(share: float) -> str:

@@ -293,8 +293,8 @@ def _compute_file(work: Work, target: Path, checkpoint: Checkpoint) -> None:
             plan.compute(work)
             frame = xr.Dataset(coords=plan.coordinates(), attrs=plan.attributes())
             frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
-            destination = target, checkpoint.working_folder, frame, plan.variables(), plan.grid
-            netcdf.write(*destination, plan.chunks(checkpoint), plan.gaps)
+            destination = target, checkpoint.working_folder, plan.variables(), plan.grid
+            netcdf.save(frame, *destination, plan.chunks(checkpoint), plan.gaps)
             return
         except DamagedTask as damage:
             if is_last:

@@ -29,9 +29,6 @@ logger = logging.getLogger("ringsweep")
 
 Columns = Mapping[str, NDArray[Any]]
 
-# Unusable task files that are named one by one.
-_MAX_NAMED = 3
-
 # In place of the path of a task file: the cells of the only task, in memory.
 _HELD = Path("in memory")
 
@@ -116,19 +113,18 @@ class Checkpoint:
         self.done[:] = False
         self.files.clear()
         self._held = None
-        unusable = 0
+        damaged = []
         for path in self.working_folder.finished_cells():
             try:
                 positions, _ = self.read(path)
             except DamagedTask as damage:
-                unusable += 1
-                if unusable <= _MAX_NAMED:
-                    logger.warning("%s: its cells are computed again", damage)
+                damaged.append(str(damage))
             else:
                 self.done[positions] = True
                 self.files[path] = int(positions[0]), int(positions[-1])
-        if unusable > _MAX_NAMED:
-            logger.warning("the cells of %d more such files are computed again too", unusable - _MAX_NAMED)
+        if damaged:
+            others = f", and {len(damaged) - 1} more such files" * (len(damaged) > 1)
+            logger.warning("%s%s: the cells are computed again", damaged[0], others)
 
     def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
         """Store the columns of the cells at these positions, which ascend.

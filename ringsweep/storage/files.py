@@ -146,12 +146,6 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
             with suppress(FileExistsError):
                 folder.mkdir(mode=mode)
                 made = True
-                if _permissions(folder) & 0o700 != 0o700:
-                    folder.rmdir()
-                    problem = (
-                        "cannot be written: the umask of this shell forbids you to read what you write; set `umask 022`"
-                    )
-                    raise InputError(str(target), problem)
                 flush_folder(folder.parent)
             # Another process may remove the folder meanwhile, because it has finished.
             with suppress(FileNotFoundError):

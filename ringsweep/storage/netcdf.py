@@ -35,50 +35,30 @@ COMPRESSED_FROM = 1024
 _CACHE = 1 << 20
 
 
-def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a dataset as NetCDF4, completely or not at all.
-
-    Parameters
-    ----------
-    ds : xarray.Dataset
-        Result of a sweep or a simulation. Attributes other than text, numbers and arrays of numbers are
-        written as JSON.
-    path : path-like
-        File to write or replace.
-
-    Raises
-    ------
-    InputError
-        If `path` cannot be written.
-    OSError
-        If writing fails, or the file differs from the dataset when it is read back.
-    """
-    with replacing(path) as temporary:
-        _write(temporary, Path(path), ds)
-
-
-def write(
-    target: Path,
-    folder: WorkingFolder,
+def save(
     frame: xr.Dataset,
-    variables: Mapping[str, Variable],
-    layout: Layout,
-    chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
+    path: str | os.PathLike[str],
+    folder: WorkingFolder | None = None,
+    variables: Mapping[str, Variable] = MappingProxyType({}),
+    layout: Layout | None = None,
+    chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]] = (),
     gaps: Collection[str] = (),
 ) -> None:
-    """Write the dataset of a sweep chunk by chunk, completely or not at all. Memory holds a few chunks at a time.
+    """Write a dataset as NetCDF4, and the columns of a sweep chunk by chunk, completely or not at all.
+
+    Memory holds a few chunks at a time. The file is sealed if it reads back as it was written.
 
     Parameters
     ----------
-    target : Path
-        File to write or replace.
-    folder : WorkingFolder
-        Folder for the temporary file.
     frame : xarray.Dataset
-        Coordinates and attributes.
+        Its attributes are text, numbers, or arrays of numbers. Of a sweep it has coordinates and attributes.
+    path : path-like
+        File to write or replace.
+    folder : WorkingFolder, optional
+        Folder for the temporary file, if this process has one already.
     variables : mapping of str to Variable
         Declarations of the columns; their dimensions are those besides the grid.
-    layout : Layout
+    layout : Layout, optional
         Chunks of the grid.
     chunks : iterable of tuple
         Slices of each chunk in the grid, and its columns in the shape of the chunk.
@@ -87,40 +67,29 @@ def write(
 
     Raises
     ------
+    InputError
+        If `path` cannot be written.
     OSError
         If writing fails, or the file differs from the dataset when it is read back.
     """
-    with folder.replacing(target) as temporary:
-        _write(temporary, target, frame, variables, layout, chunks, gaps)
-
-
-def _write(
-    path: Path,
-    target: Path,
-    frame: xr.Dataset,
-    variables: Mapping[str, Variable] = MappingProxyType({}),
-    layout: Layout | None = None,
-    chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]] = (),
-    gaps: Collection[str] = (),
-) -> None:
-    """Write a dataset, then columns chunk by chunk, and seal the file if it reads back as it was written."""
-    digest, names = hashlib.blake2b(), list[str]()
-    try:
-        with _small_caches(), _created(path) as file:
-            _add(frame, file)
-            for data in frame.variables.values():
-                _add_values(digest, data.values)
-            for region, columns in chunks:
-                if layout is not None and not names:
-                    names = list(columns)
-                    _declare(file, frame, variables, layout, columns, gaps)
-                for name in names:
-                    file[name][(*region, ...)] = columns[name]
-                    _add_values(digest, columns[name])
-        _seal(path, frame, names, layout, digest.digest())
-    except (OSError, RuntimeError) as error:
-        # If the disk is full, the NetCDF library only reports "HDF error".
-        raise OSError(f"{target} could not be written ({error}); is the disk full, or faulty?") from error
+    target, digest, names = Path(path), hashlib.blake2b(), list[str]()
+    with replacing(path) if folder is None else folder.replacing(target) as temporary:
+        try:
+            with _small_caches(), _created(temporary) as file:
+                _add(frame, file)
+                for data in frame.variables.values():
+                    _add_values(digest, data.values)
+                for region, columns in chunks:
+                    if layout is not None and not names:
+                        names = list(columns)
+                        _declare(file, frame, variables, layout, columns, gaps)
+                    for name in names:
+                        file[name][(*region, ...)] = columns[name]
+                        _add_values(digest, columns[name])
+            _seal(temporary, frame, names, layout, digest.digest())
+        except (OSError, RuntimeError) as error:
+            # If the disk is full, the NetCDF library only reports "HDF error".
+            raise OSError(f"{target} could not be written ({error}); is the disk full, or faulty?") from error
 
 
 @contextmanager
@@ -160,9 +129,6 @@ def _seal(path: Path, frame: xr.Dataset, names: Iterable[str], layout: Layout | 
 def _add(ds: xr.Dataset, file: Any) -> None:
     """Write a dataset into an open file, which xarray must not close."""
     ds = ds.drop_encoding()
-    ds.attrs = _storable(ds.attrs)
-    for variable in ds.variables.values():
-        variable.attrs = _storable(variable.attrs)
     encoding = {name: _encoding(variable) for name, variable in ds.variables.items()}
     ds.dump_to_store(NetCDF4DataStore(file), encoding=encoding)
 
@@ -254,7 +220,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     path : path-like
-        File written by :func:`save` or :func:`write`.
+        File written by :func:`save`.
 
     Returns
     -------
@@ -391,18 +357,3 @@ def _encoding(variable: xr.Variable) -> dict[str, Any]:
     if variable.dtype.kind in "iuf" and variable.size >= COMPRESSED_FROM:
         encoding |= {"zlib": True, "complevel": 1, "fletcher32": True}
     return encoding
-
-
-def _storable(attributes: dict[Any, Any]) -> dict[str, Any]:
-    return {str(name): _storable_value(value) for name, value in attributes.items()}
-
-
-def _storable_value(value: Any) -> Any:
-    if isinstance(value, str):
-        return value
-    kind = np.asarray(value).dtype.kind if isinstance(value, int | float | np.generic | np.ndarray) else "O"
-    return value if kind in "iuf" else json.dumps(value, default=_plain)
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)

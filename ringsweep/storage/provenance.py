@@ -21,6 +21,7 @@ import numpy as np
 from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.compile.cache import OWN_FILES
 from ringsweep.config import Config, as_named
+from ringsweep.errors import shortened
 from ringsweep.models import model_of
 from ringsweep.models.scene import ELSEWHERE, LAW
 from ringsweep.physics.drives import DRIVES
@@ -104,9 +105,6 @@ def _section(options: Any, **keys: str) -> str:
 # Digest of a column or a table, at the end of its description.
 _DIGEST = re.compile(r" \([0-9a-f]{12}\)$")
 
-# Differences that are named one by one.
-_MAX_NAMED = 4
-
 
 def fingerprint(identity: Mapping[str, str]) -> str:
     """Digest of an identity: equal for sweeps that give the same bits."""
@@ -116,16 +114,17 @@ def fingerprint(identity: Mapping[str, str]) -> str:
 def differences(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     """Differences between two identities in words, without digests."""
     names = [name for name in {**environment(), **new, **old} if old.get(name) != new.get(name)]
-    if "ringsweep" in names:
-        names = [name for name in names if name != "sources"]
-    words = [_difference(name, _short(old.get(name)), _short(new.get(name))) for name in names[:_MAX_NAMED]]
-    return "; ".join(words + [f"and {len(names) - _MAX_NAMED} more"] * (len(names) > _MAX_NAMED))
+    if {"ringsweep", "sources"} <= set(names):
+        names.remove("sources")
+    words = (_difference(name, old.get(name, "absent"), new.get(name, "absent")) for name in names)
+    return shortened("; ".join(words), 500)
 
 
-def _difference(name: str, old: str, new: str) -> str:
+def _difference(name: str, *values: str) -> str:
     if name == "sources":
         # The version stays the same in a checkout.
         return "the source code of ringsweep has changed"
+    old, new = (shortened(_DIGEST.sub("", value), 100) for value in values)
     return f"{name} was {old}, is {new}" if old != new else f"{name} has other values ({new})"
 
 
@@ -195,10 +194,3 @@ def _digest(*arrays: Any) -> str:
         numeric = array.dtype.kind in "fiu"
         digest.update(array.astype("<f8").tobytes() if numeric else json.dumps(array.tolist()).encode())
     return digest.hexdigest()[:12]
-
-
-def _short(value: str | None) -> str:
-    if value is None:
-        return "absent"
-    value = _DIGEST.sub("", value)
-    return value if len(value) <= 100 else f"{value[:97]}..."
