@@ -169,7 +169,7 @@ class TestReuse:
         target.write_bytes(full.read_bytes())
         for output in ([], ["-o", f"../{tmp_path.name}/full.nc"]):
             assert cli.main(["run", "full.nc", "--refine", *output]) == 2
-            assert "full.nc: holds another sweep: sweep.refine was absent" in capsys.readouterr().err
+            assert "full.nc: holds another sweep: sweep.refine.dims was absent" in capsys.readouterr().err
             assert target.read_bytes() == full.read_bytes()
 
     @pytest.mark.slow

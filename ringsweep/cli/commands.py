@@ -329,13 +329,10 @@ def info_command(arguments: argparse.Namespace) -> None:
 
             print(references(load(arguments.dataset), result.attrs["ringsweep_version"]))
             return
-        if arguments.json:
-            from ringsweep.report.text import as_json
+        from ringsweep.report.text import about, as_json
 
-            print(as_json(result))
-            return
-        _print_summary(arguments.dataset, result)
-    if sealed:
+        print(as_json(result) if arguments.json else about(result))
+    if sealed and not arguments.json:
         print("seal: the file is what ringsweep wrote")
 
 
@@ -357,36 +354,6 @@ def verify_command(arguments: argparse.Namespace) -> int:
         else:
             print(f"{file}: is what ringsweep wrote")
     return status
-
-
-def _print_summary(name: str, result: Any) -> None:
-    import json
-
-    from ringsweep.quantities.quantity import after_number
-    from ringsweep.quantities.variables import in_unit, written_unit
-    from ringsweep.report.text import in_lines
-
-    configuration = json.loads(result.attrs.get("configuration", "{}"))
-    print(result.attrs.get("title", name))
-    print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
-    for name, axis in result.coords.items():
-        if "contender" in axis.dims:
-            continue
-        if axis.dtype.kind not in "iuf":
-            print(f"  {name}: {', '.join(dict.fromkeys(map(str, axis.values.flat)))}")
-            continue
-        if axis.size:
-            with suppress(InputError):
-                axis = in_unit(axis, written_unit(configuration, axis.attrs.get("path", "")))
-            unit = after_number(axis.attrs.get("units", "1"))
-            print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{unit}")
-    if not {"contender", "time"} & set(result.dims):
-        print("variables:", ", ".join(map(str, result.data_vars)))
-    print(in_lines(result))
-    print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))
-    if "own_files" in result.attrs:
-        print("own files:", result.attrs["own_files"], "(RINGSWEEP_LAWS must name them to run it again)")
-    print("versions:", result.attrs["ringsweep_version"], result.attrs.get("versions", ""))
 
 
 def schema_command(arguments: argparse.Namespace) -> None:

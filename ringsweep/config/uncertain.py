@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -163,15 +163,6 @@ class Sample:
                 else:
                     columns[path] = (*dims, "sample"), base[..., None] * drawn
         return Axes({**axes.sizes, "sample": len(shares)}, columns)
-
-    @property
-    def identity(self) -> dict[str, str]:
-        """All that determines its results, by name."""
-        found = {f"sweep.sample.of.{factor.name}": repr(factor) for factor in self.factors}
-        for field in fields(self)[1:]:
-            key = "sensitivity.of" if field.name == "sensitive" else field.name
-            found[f"sweep.sample.{key}"] = str(getattr(self, field.name))
-        return found
 
 
 @lru_cache(maxsize=2)

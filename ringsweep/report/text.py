@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 from itertools import chain
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from ringsweep.errors import InputError
 from ringsweep.quantities.flags import CERTIFIED, FAILED, JAMMED, REGIMES, RIDING, SEPARATING
-from ringsweep.quantities.variables import DOUBTS, INFERRED, is_classification, meanings_of, words
+from ringsweep.quantities.quantity import after_number
+from ringsweep.quantities.variables import (
+    DOUBTS,
+    INFERRED,
+    in_unit,
+    is_classification,
+    meanings_of,
+    words,
+    written_unit,
+)
 from ringsweep.storage.chunks import parts
 
 
@@ -25,6 +36,29 @@ def status_of(result: xr.Dataset) -> int:
 def in_lines(result: xr.Dataset) -> str:
     """The summary of a result as text."""
     return "\n".join(chain(*summary(result).values()))
+
+
+def about(result: xr.Dataset) -> str:
+    """What a file holds, as text: its dimensions, coordinates and variables, the summary, and what it was made with."""
+    configuration, lines = json.loads(result.attrs.get("configuration", "{}")), [result.attrs.get("title", "a result")]
+    sizes = ", ".join(f"{name} {size}" for name, size in result.sizes.items())
+    lines.append(f"dimensions: {sizes or 'none: a single run'}")
+    for name, axis in result.coords.items():
+        if "contender" in axis.dims:
+            continue
+        if axis.dtype.kind not in "iuf":
+            lines.append(f"  {name}: {', '.join(dict.fromkeys(map(str, axis.values.flat)))}")
+        elif axis.size:
+            with suppress(InputError):
+                axis = in_unit(axis, written_unit(configuration, axis.attrs.get("path", "")))
+            unit = after_number(axis.attrs.get("units", "1"))
+            lines.append(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{unit}")
+    if not {"contender", "time"} & set(result.dims):
+        lines.append(f"variables: {', '.join(map(str, result.data_vars))}")
+    lines += [in_lines(result), f"solver: {json.dumps(configuration.get('solver', result.attrs.get('method')))}"]
+    if "own_files" in result.attrs:
+        lines.append(f"own files: {result.attrs['own_files']} (RINGSWEEP_LAWS must name them to run it again)")
+    return "\n".join([*lines, f"versions: {result.attrs['ringsweep_version']} {result.attrs.get('versions', '')}"])
 
 
 def as_json(result: xr.Dataset) -> str:

@@ -236,10 +236,6 @@ class WorkingFolder:
         if not self.is_own():
             raise OSError(f"{self.path} was deleted while this process used it; what it held is lost")
 
-    def temporary(self, suffix: str = "") -> Path:
-        """A new name in the folder. A file of this name is removed by the next process, if this one does not."""
-        return self.path / f"{secrets.token_hex(4)}.tmp{suffix}"
-
     def remove_temporary(self) -> None:
         """Remove what was not finished."""
         for path in self._named(_TEMPORARY):
@@ -262,7 +258,8 @@ class WorkingFolder:
 
         It gets the permissions of `target`, and no power cut can undo it. If the block fails, it is removed.
         """
-        temporary = self.temporary(target.suffix)
+        # A file of such a name is removed by the next process, if this one does not.
+        temporary = self.path / f"{secrets.token_hex(4)}.tmp{target.suffix}"
         try:
             yield temporary
             with temporary.open("r+b") as file:

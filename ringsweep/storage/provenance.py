@@ -23,7 +23,7 @@ from ringsweep.compile.cache import OWN_FILES
 from ringsweep.config import Config, as_named
 from ringsweep.errors import shortened
 from ringsweep.models import model_of
-from ringsweep.models.scene import ELSEWHERE, LAW
+from ringsweep.models.scene import ELSEWHERE, LAW, Section
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import TRAITS
 
@@ -77,29 +77,17 @@ def identity(config: Config) -> dict[str, str]:
         if path not in axes.columns:
             # Numbers are the same, whichever of its two names the friction outside the zones has.
             found[f"scene.{as_named(path, ELSEWHERE[0])}"] = repr(float(value))
-    if structure.exponent:
-        found["record.exponent"] = "true"
-    if structure.section is not None:
-        found["record.section"] = f"at {structure.section.at}, keep {structure.section.keep}"
-        if structure.section.period is not None:
-            found["record.section.period"] = repr(structure.section.period)
-    if config.follow is not None:
-        found["sweep.follow"] = _section(config.follow, path="axis")
-    if config.refine is not None:
-        found["sweep.refine"] = _section(config.refine, dims="axes")
+    asked = {"record.section": structure.section, "sweep.follow": config.follow, "sweep.refine": config.refine}
+    for path, part in (asked | {"sweep.sample": config.sample, "solver": config.solver}).items():
+        if part is not None:
+            values = part._asdict() if isinstance(part, Section) else dataclasses.asdict(part)
+            found |= {f"{path}.{key}": json.dumps(value) for key, value in values.items() if value is not None}
+    found |= {"solver": config.solver.name, "record.exponent": json.dumps(structure.exponent)}
     found["sweep"] = ", ".join(f"{name} {size}" for name, size in axes.sizes.items()) or "a single run"
     for path, (dims, column) in axes.columns.items():
         ends = " to ".join(f"{end:.6g}" if column.dtype.kind == "f" else str(end) for end in column.flat[[0, -1]])
         found[f"sweep.{path}"] = f"{column.size} values, {ends}, along {' x '.join(dims)} ({_digest(column)})"
-    if config.sample is not None:
-        found |= config.sample.identity
-    return found | {"solver": f"method: {config.solver.name}, {_section(config.solver)}"} | environment()
-
-
-def _section(options: Any, **keys: str) -> str:
-    """Fields of a dataclass as keys and values of a configuration; `keys` are those that bear other names there."""
-    values = {keys.get(name, name): value for name, value in dataclasses.asdict(options).items() if value is not None}
-    return ", ".join(f"{key}: {json.dumps(value)}" for key, value in values.items())
+    return found | environment()
 
 
 # Digest of a column or a table, at the end of its description.
