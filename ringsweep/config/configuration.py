@@ -32,15 +32,6 @@ Setting = str | tuple[str, Any]
 
 _SECTIONS = "scene", "solver", "record", "sweep"
 
-# Parts of a configuration that exclude each other, and why.
-_EXCLUDING = (
-    ("refine", "sample", "a probability has no boundary, and each cell needs its own runs"),
-    ("refine", "section", "cells that are inferred have no points"),
-    ("sample", "section", "a probability has no points"),
-    ("refine", "follow", "each cell needs the one before"),
-    ("sample", "follow", "each cell needs the one before"),
-)
-
 
 @dataclass(frozen=True)
 class Config:
@@ -212,11 +203,12 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         check_consistency(scene, axes)
     given = tree.get("sweep", {})
     refine, follow = read_refinement(given.get("refine"), axes), read_follow(given.get("follow"), scene, axes)
-    parts = {"refine": refine, "sample": sample, "follow": follow, "section": scene.structure.section}
-    for one, other, why in _EXCLUDING:
-        if parts[one] is not None and parts[other] is not None:
-            beside = f"record.{other}" if other == "section" else f"sweep.{other}"
-            raise InputError(f"sweep.{one}", f"cannot stand beside {beside}: {why}; leave one of them out")
+    # Cells that are inferred, and probabilities, have no points of a section.
+    section = None if refine is None and sample is None else scene.structure.section
+    parts = {"sweep.refine": refine, "sweep.sample": sample, "sweep.follow": follow, "record.section": section}
+    excluding = [path for path, part in parts.items() if part is not None]
+    if len(excluding) > 1:
+        raise InputError(excluding[0], f"cannot stand beside {excluding[1]}: leave one of them out")
     _tell_units(changed, scene)
     axes = with_direction(axes, follow)
     return Config(scene, solver, axes, tree, doc.name, refine, sample, follow)

@@ -131,17 +131,16 @@ def _open(about: str, values: dict[str, Any], **rest: Any) -> dict[str, Any]:
     return {"description": about, "type": "object", **rest, "additionalProperties": values}
 
 
-def _list(items: dict[str, Any], about: str = "", **rest: Any) -> dict[str, Any]:
-    return ({"description": about} if about else {}) | {"type": "array", "items": items, "minItems": 1, **rest}
+def _list(items: dict[str, Any], **rest: Any) -> dict[str, Any]:
+    return {"type": "array", "items": items, "minItems": 1, **rest}
 
 
 def _text(about: str) -> dict[str, Any]:
     return {"description": about, **_TEXT}
 
 
-def _any(*options: Mapping[str, Any], about: str = "") -> dict[str, Any]:
-    described = {"description": about} if about else {}
-    return {**described, **(options[0] if len(options) == 1 else {"anyOf": list(options)})}
+def _any(*options: Mapping[str, Any], **about: str) -> dict[str, Any]:
+    return {**about, **(options[0] if len(options) == 1 else {"anyOf": list(options)})}
 
 
 def _word(about: str, meanings: Mapping[str, str]) -> dict[str, Any]:
@@ -170,7 +169,7 @@ def _solver() -> dict[str, Any]:
     for name, about in _meanings(METHODS).items():
         options = {"method": {"const": name, "description": about}, **_keys(options_of(METHODS[name]))}
         methods.append(_section(options, "method"))
-    return _any(*methods, about="how time advances")
+    return _any(*methods, description="how time advances")
 
 
 def _sweep(paths: list[str]) -> dict[str, Any]:
@@ -192,10 +191,10 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     return _section(
         {
             "grid": _open(grid, axis, propertyNames=together, properties=of_laws),
-            "refine": _any(_FLAG, _section(refined), about=boundaries),
-            "follow": _any(_TEXT, followed, about=which),
+            "refine": _any(_FLAG, _section(refined), description=boundaries),
+            "follow": _any(_TEXT, followed, description=which),
             "sample": _sample(together, axis),
-            "points": _any(_TEXT, columns, about=points),
+            "points": _any(_TEXT, columns, description=points),
         }
     )
 
@@ -208,7 +207,7 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
     about = "[least value, greatest value], or mean ± tolerance, which may be in per cent"
     kinds["uniform"] = {"description": about, "anyOf": [kinds["uniform"], _TEXT]}
     columns = {"type": "object", "additionalProperties": _list(_VALUE)}
-    kinds["values"] = _any(_list(_VALUE), columns, about="values, each as probable as the others")
+    kinds["values"] = _any(_list(_VALUE), columns, description="values, each as probable as the others")
     kinds["file"] = _text("CSV file with a column for each path; a row is a draw")
     kinds["over"] = _text("path that the draw is multiplied by")
     drawn = "path -> distribution; paths with commas between them are drawn together"

@@ -172,14 +172,12 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
         return Document(reader.value(node), file.parent, file.stem, reader.locations)
     except InputError:
         raise
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else None
-        raise InputError("", f"not valid YAML: {error.problem or error.context}", file=str(file), line=line) from None
-    except RecursionError:
-        raise InputError("", "nested too deeply", file=str(file)) from None
-    except (yaml.YAMLError, ValueError, OverflowError) as error:
-        # On escapes of characters that do not exist PyYAML raises such errors.
-        raise InputError("", f"not valid YAML: {' '.join(str(error).split())}", file=str(file)) from None
+    # On escapes of characters that do not exist PyYAML raises ValueError or OverflowError.
+    except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
+        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error)
+        problem = "nested too deeply" if isinstance(error, RecursionError) else problem
+        line = None if mark is None else mark.line + 1
+        raise InputError("", f"not valid YAML: {' '.join(problem.split())}", file=str(file), line=line) from None
 
 
 def is_result(file: Path) -> bool:
