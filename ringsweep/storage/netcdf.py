@@ -76,7 +76,9 @@ def save(
     with replacing(path) if folder is None else folder.replacing(target) as temporary:
         try:
             with _small_caches(), _created(temporary) as file:
-                _add(frame, file)
+                # xarray must not close the file.
+                encoding = {name: _encoding(variable) for name, variable in frame.variables.items()}
+                frame.drop_encoding().dump_to_store(NetCDF4DataStore(file), encoding=encoding)
                 for data in frame.variables.values():
                     _add_values(digest, data.values)
                 for region, columns in chunks:
@@ -126,13 +128,6 @@ def _seal(path: Path, frame: xr.Dataset, names: Iterable[str], layout: Layout | 
     trailer.seal(path)
 
 
-def _add(ds: xr.Dataset, file: Any) -> None:
-    """Write a dataset into an open file, which xarray must not close."""
-    ds = ds.drop_encoding()
-    encoding = {name: _encoding(variable) for name, variable in ds.variables.items()}
-    ds.dump_to_store(NetCDF4DataStore(file), encoding=encoding)
-
-
 def _declare(
     file: Any,
     frame: xr.Dataset,
@@ -149,9 +144,10 @@ def _declare(
         for dim, size in zip(variables[name].dims, inner, strict=True):
             if dim not in file.dimensions:
                 file.createDimension(dim, size)
-        fill = MISSING if name in gaps else False
-        dims = (*grid, *variables[name].dims)
-        variable = file.createVariable(name, column.dtype, dims, fill_value=fill, **_chunked(layout, inner))
+        stored: dict[str, Any] = {"fill_value": MISSING if name in gaps else False}
+        if layout.total * math.prod(inner) >= COMPRESSED_FROM:
+            stored |= {"compression": "zlib", "complevel": 1, "fletcher32": True, "chunksizes": (*layout.chunk, *inner)}
+        variable = file.createVariable(name, column.dtype, (*grid, *variables[name].dims), **stored)
         variable.set_auto_maskandscale(False)
         described = variables[name].attributes | error_attribute(name, columns)
         variable.setncatts(described | ({"coordinates": others} if others else {}))
@@ -166,12 +162,6 @@ def _small_caches() -> Iterator[None]:
         yield
     finally:
         netCDF4.set_chunk_cache(*before)
-
-
-def _chunked(layout: Layout, inner: tuple[int, ...]) -> dict[str, Any]:
-    if layout.total * math.prod(inner) < COMPRESSED_FROM:
-        return {}
-    return {"compression": "zlib", "complevel": 1, "fletcher32": True, "chunksizes": (*layout.chunk, *inner)}
 
 
 #: Kinds of results, by a dimension or a variable that no kind after it has.
