@@ -264,9 +264,10 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
         checked.append(np.unique([along[0].argmin(), along[0].argmax()]) if monotone else np.arange(size))
     shape = (1, *map(len, checked))
     total = math.prod(shape)
-    section, periodic, able = scene.structure.section, False, MODELS[scene.structure.model].sections
+    section, able = scene.structure.section, MODELS[scene.structure.model].sections
     # Without a section at turns, a motion without a period has no cycles.
     needed = section.at == "period" if section is not None else scene.structure.exponent and "turn" not in able
+    periodic = not needed
     for start in range(0, total, _CELLS_AT_ONCE):
         flat = np.arange(start, min(start + _CELLS_AT_ONCE, total))
         numbers = np.unravel_index(flat, shape)[1:]
@@ -278,9 +279,8 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
                 if any(path.rpartition(".")[2] in str(error) for path in axes.columns):
                     error.problem += " (in a cell of the sweep)"
                 raise
-            if needed and not periodic:
-                periodic = bool(np.isfinite(made.forcing_period).any())
-    if needed and not periodic:
+            periodic = periodic or bool(np.isfinite(made.forcing_period).any())
+    if not periodic:
         others = "give one, or state it by `period`" + (", or take `turn`" if "turn" in able else "")
         where = "record.section.at" if section is not None else "record.exponent"
         raise InputError(where, f"neither force nor drive has a period: {others}")

@@ -304,18 +304,16 @@ def read_table(
     if "file" in given:
         if any(name in given for name in columns):
             raise InputError(f"{where}.file", f"give a file, or {first} and {second}, not both")
-        found = doc.inline_csv(given["file"], f"{where}.file", where)
-        renamed = {"time" if name == "t" else name: cells for name, cells in found.items()}
-        if set(renamed) != set(columns) or len(found) != 2:
+        found = doc.inline_csv(given["file"], f"{where}.file", where, t="time")
+        if set(found) != set(columns):
             names = ["t" if name == "time" else name for name in columns]
-            missing = [name for name in names if name not in found]
-            wrong = {name: nearest_name(name, missing) for name in found if name not in names}
+            missing = [name for name in columns if name not in found]
+            wrong = {name: nearest_name(name, missing) for name in found if name not in columns}
             hints = [f"; did you mean `{near}` by {shortened(name, 40)}?" for name, near in wrong.items() if near]
             problem = f"columns {', '.join(names)} are expected; got {', '.join(found)}{''.join(hints[:1])}"
             raise InputError(f"{where}.file", problem)
-        doc.locations |= {k.replace(f"{section}.t.", f"{section}.time."): v for k, v in doc.locations.items()}
         del given["file"]
-        given |= renamed
+        given |= found
     for name in columns:
         if name not in given:
             raise InputError(f"{where}.{name}", f"missing: a table needs a file, or the lists {first} and {second}")

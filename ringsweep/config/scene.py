@@ -223,10 +223,7 @@ def warn_of_plain_angle(path: str, given: Any, parameter: Parameter | Choice) ->
 
 def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
     """Every numeric path that a scene has under at least one of its laws."""
-    found: dict[str, Parameter] = {}
-    for structure in structures.values():
-        found |= parameters(structure)
-    return found
+    return {path: parameter for one in structures.values() for path, parameter in parameters(one).items()}
 
 
 def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:

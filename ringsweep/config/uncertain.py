@@ -352,18 +352,17 @@ def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str
     if given is None or isinstance(given, bool):
         return bool(given), ()
     where = "sweep.sample.sensitivity"
-    if not isinstance(given, dict) or set(given) != {"of"}:
-        raise InputError(where, f"true, false, or {{of: [t_end]}} is expected, got {show(given)}")
-    if not isinstance(given["of"], list) or not given["of"]:
-        raise InputError(f"{where}.of", f"a list of variables is expected, got {show(given['of'])}")
+    of = read_keys(given, {"of": Key("variables", example="[t_end]")}, where)["of"]
+    if not isinstance(of, list) or not of:
+        raise InputError(f"{where}.of", f"a list of variables is expected, got {show(of)}")
     time = censored(scene)
     names = [name for name in outcome_numbers(scene) if name not in CENSORED or name == time]
-    for k, name in enumerate(given["of"]):
+    for k, name in enumerate(of):
         if name == time and not timed:
             problem = f"{time} is missing in runs in which it does not happen: say at which times, by survival: [1 s]"
             raise InputError(f"{where}.of.{k}", problem)
         one_of(name, names, f"{where}.of.{k}", "is no number of this model")
-    return True, tuple(dict.fromkeys(given["of"]))
+    return True, tuple(dict.fromkeys(of))
 
 
 def _survival(given: Any, scene: Scene) -> tuple[float, ...]:

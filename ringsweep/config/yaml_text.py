@@ -80,7 +80,7 @@ class Document:
                 error.file, error.line = self.locations.get(path, (None, None))
             raise
 
-    def inline_csv(self, name: Any, path: str, section: str) -> dict[str, list[Any]]:
+    def inline_csv(self, name: Any, path: str, section: str, **names: str) -> dict[str, list[Any]]:
         """Columns of a CSV file by their names in its header. A unit in the header is appended to each value.
 
         Parameters
@@ -91,6 +91,8 @@ class Document:
             Path of the file name in the configuration.
         section : str
             Path that the columns will have. Values are located as ``section.column.row``.
+        **names
+            Names of columns that have other names in the header.
 
         Raises
         ------
@@ -122,6 +124,7 @@ class Document:
                 if not name:
                     form = "a name is expected, and behind it the unit in brackets: phi (deg)"
                     raise wrong(f"column {show(cell.strip())}: {form}")
+                name = names.get(name, name)
                 if name in columns:
                     raise wrong(f"two columns have the name {name}")
                 columns[name] = unit, []
