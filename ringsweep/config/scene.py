@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from itertools import product
 from math import pi
 from types import MappingProxyType
@@ -254,6 +255,12 @@ def structures_of(
         yield Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT, **rest)
 
 
+@lru_cache(maxsize=4096)
+def _paths_under(structure: Structure, *registered: Any) -> tuple[str, ...]:
+    """Paths of the numbers of a scene, for as long as the same types are registered under its names."""
+    return tuple(parameters(structure))
+
+
 class _Keys:
     """Keys that a scene of a model can have, under some laws and some drives.
 
@@ -277,7 +284,8 @@ class _Keys:
         structures = [*structures_of(moved.model, laws, own, zones, drives, elsewhere=moved.elsewhere)]
         structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
         paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
-        paths |= dict.fromkeys(path for structure in structures for path in parameters(structure))
+        for one in structures:
+            paths |= dict.fromkeys(_paths_under(one, model_of(one), one.law_type, one.drive_type))
         self.known = set(paths)
         self.children: dict[str, dict[str, None]] = {}
         for path in paths:
