@@ -278,9 +278,7 @@ def animate_command(arguments: argparse.Namespace) -> int:
     if not MODELS[model].driven:
         raise InputError("scene.model", f"{model}: no ring or belt to animate; ringsweep simulate draws the history")
     if config.axes.sizes:
-        raise InputError(
-            "sweep", "several friction laws, but an animation shows one run: name its law by --set friction.law=..."
-        )
+        raise InputError("sweep", "several friction laws: name the one to animate by --set friction.law=...")
 
     from ringsweep.plots.films import check_animation
     from ringsweep.report.text import status_of
@@ -307,8 +305,7 @@ def precision_command(arguments: argparse.Namespace) -> None:
 
     from ringsweep.report.text import in_lines
 
-    given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
-    options = {name: value for name, value in given.items() if value is not None}
+    options = {name: value for name, value in vars(arguments).items() if name in ("target", "cells", "rounds")}
     result = ringsweep.precision(arguments.config, **options, progress=not arguments.quiet)
     _store(result, target, picture, in_lines(result), "work_precision")
 

@@ -51,15 +51,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     logging.getLogger().handlers[0].setFormatter(_Formatter())
-    logging.getLogger("ringsweep").setLevel(
-        logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
-    )
+    level = logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
+    logging.getLogger("ringsweep").setLevel(level)
+    out = None if arguments.quiet else _Escaped(sys.stdout)
     try:
-        with (
-            _terminable(),
-            _warnings_in_one_line(),
-            redirect_stdout(None if arguments.quiet else _Escaped(sys.stdout)),
-        ):
+        with _terminable(), _warnings_in_one_line(), redirect_stdout(out):
             status = arguments.command(arguments)
             print(end="", flush=True)
     except InputError as error:

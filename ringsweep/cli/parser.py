@@ -108,9 +108,9 @@ def build_parser() -> argparse.ArgumentParser:
     precision = _add_command(entries, commands.precision_command, "config CONFIG.yaml", taken)
     _option(precision, "-o --output OUT.nc", "default: the configuration's name with -precision")
     target = "largest error allowed: rad or m at the end, s at separation (default: 1e-6)"
-    _option(precision, "--target E", target, type=_POSITIVE)
-    _option(precision, "--cells N", "number of cells to measure (default: 16)", type=_COUNT)
-    _option(precision, "--rounds N", "timings of each setting (default: 3)", type=_COUNT)
+    _option(precision, "--target E", target, type=_POSITIVE, default=argparse.SUPPRESS)
+    _option(precision, "--cells N", "cells to measure (default: 16)", type=_COUNT, default=argparse.SUPPRESS)
+    _option(precision, "--rounds N", "timings of each setting (default: 3)", type=_COUNT, default=argparse.SUPPRESS)
 
     info = _add_command(entries, commands.info_command, "dataset OUT.nc")
     _option(info, *_JSON)

@@ -159,9 +159,8 @@ class Checkpoint:
     def _write(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
         """Write a task file."""
         # One structured array: each member of an archive takes longer to write than a few hundred cells.
-        cells = np.empty(
-            len(positions), dtype=[(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
-        )
+        dtype = [(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
+        cells = np.empty(len(positions), dtype=dtype)
         for name, column in columns.items():
             cells[name] = column
         labels = {"key": np.array(self.fingerprint), "processor": np.array(processor)}

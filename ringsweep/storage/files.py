@@ -110,11 +110,9 @@ def check_name(path: str | os.PathLike[str]) -> None:
         raise InputError(str(path), "is a symbolic link that leads to itself") from error
     except UnicodeEncodeError as error:
         shown = os.fsencode(path).decode("utf-8", "replace")
-        raise InputError(
-            ascii(shown)[1:-1],
-            f"the name, or that of a folder above it, has characters that the locale ({encoding}) does not have: "
-            "set LC_ALL=C.UTF-8 or PYTHONUTF8=1, or choose another name",
-        ) from error
+        problem = f"the name, or that of a folder above it, has characters that the locale ({encoding}) does not have: "
+        cure = "set LC_ALL=C.UTF-8 or PYTHONUTF8=1, or choose another name"
+        raise InputError(ascii(shown)[1:-1], problem + cure) from error
 
 
 @contextmanager
@@ -344,6 +342,5 @@ def _refuse_foreign(target: Path, folder: Path) -> None:
                 raise InputError(str(target), f"{refusal} {name} in it is a link or no file: remove it")
     if MANIFEST not in names and len(own) < len(names):
         other = next(name for name in names if name not in own)
-        raise InputError(
-            str(target), f"{refusal} it is not of ringsweep: it holds {other}. Rename it, or name another output"
-        )
+        problem = f"it is not of ringsweep: it holds {other}. Rename it, or name another output"
+        raise InputError(str(target), f"{refusal} {problem}")
