@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 import ringsweep
-from ringsweep.config.own import TABLES, own_drive, own_force
+from ringsweep.config.own import TABLES, drive_type, force_type
 from ringsweep.models import parameters
 from ringsweep.models.scene import Structure
 from ringsweep.quantities.parameters import Parameter
@@ -96,8 +96,8 @@ class Kind:
             self.drive if "law" not in scene.get("drive", {}) else scene["drive"]["law"],
             arcs,
             impact=self.impact,
-            own_drive=own_drive(self.model, scene.get("drive", {})),
-            own_force=own_force(scene.get("force")),
+            own_drive=drive_type(self.model, scene.get("drive", {})),
+            own_force=force_type(scene.get("force")),
             force=(_TIMES, _COURSE) if self.force == "table" else None,
         )
         of_force = {"harmonic": ("amplitude", "frequency", "phase"), "constant": ("constant",)}.get(self.force, ())

@@ -132,8 +132,6 @@ def read_data_array(
     dims = tuple(map(str, given.dims))
     if not dims:
         raise InputError(where, "a DataArray without dimensions varies nothing")
-    if given.size > MAX_CELLS:
-        raise InputError(where, f"more than {MAX_CELLS} values are too many")
     unit = str(given.attrs.get("units", "1"))
     # The values of quantities would be stripped of their units.
     flat: Any = given.data.ravel() if is_quantity(given.data) else given.values.ravel()

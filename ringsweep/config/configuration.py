@@ -289,8 +289,6 @@ def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
             node[key] = {}
             doc.locations[".".join(parents[:depth])] = told
         node = _child(node, key, full)
-    if not isinstance(node, dict | list):
-        raise InputError(full, f"cannot be set: {'.'.join(parents)} is {show(node)}")
     before = node.get(last) if isinstance(node, dict) else _child(node, last, full)
     place: Any = last if isinstance(node, dict) else int(last)
     node[place] = value

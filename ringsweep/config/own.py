@@ -168,7 +168,7 @@ def read_laws(
     return names, own | own_laws(section), curve
 
 
-def own_drive(model: str, drive: Mapping[str, Any]) -> type | None:
+def drive_type(model: str, drive: Mapping[str, Any]) -> type | None:
     """Type of the drive if the section ``drive`` has the formula ``theta``.
 
     Raises
@@ -184,7 +184,7 @@ def own_drive(model: str, drive: Mapping[str, Any]) -> type | None:
     return _defined(lambda: drives.define(drive["theta"], MODELS[model].drive_unit), texts)
 
 
-def own_force(force: Any) -> type | None:
+def force_type(force: Any) -> type | None:
     """Type of the force on the body if the section ``force`` has a ``formula``.
 
     Raises

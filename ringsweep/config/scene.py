@@ -11,18 +11,8 @@ from math import pi
 from types import MappingProxyType
 from typing import Any
 
+from ringsweep.config import own
 from ringsweep.config.options import read_record
-from ringsweep.config.own import (
-    FORMULA,
-    TABLE_KEYS,
-    TABLE_LAW,
-    law_choice,
-    laws_with,
-    own_drive,
-    own_force,
-    read_laws,
-    read_samples,
-)
 from ringsweep.config.sections import choose, missing_text, section_of, suggestion, warn_once
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
@@ -43,8 +33,8 @@ _LARGEST_ANGLE = 4.0 * pi
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
     """Every path of a scene that a sweep can vary, with its parameter."""
-    own = {law: structure.own_law for law, structure in scene.structures.items() if structure.own_law is not None}
-    return {**numbers_of(scene.structures), LAW: law_choice(scene.structure.model, own)}
+    defined = {law: structure.own_law for law, structure in scene.structures.items() if structure.own_law is not None}
+    return {**numbers_of(scene.structures), LAW: own.law_choice(scene.structure.model, defined)}
 
 
 def outcome_numbers(scene: Scene) -> list[str]:
@@ -75,23 +65,25 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     exponent, section = read_record(doc.tree.get("record", {}), model)
     elsewhere = _name_elsewhere(scene, swept)
     zones = _zones(scene)
-    names, own, curve = read_laws(doc, scene, model, laws)
+    names, defined, curve = own.read_laws(doc, scene, model, laws)
     moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
-    keys = _Keys(moved, law_choice(model, own).names, own, zones or ("zones.0",))
+    known = own.law_choice(model, defined).names
+    keys = _Keys(moved, known, defined, zones or ("zones.0",))
     leaves = dict(keys.leaves(scene, names))
     if not names:
         section_of(scene, "friction", "scene.")
-        raise InputError(f"scene.{LAW}", f"missing: name a friction law: {', '.join(law_choice(model, own).names)}")
+        raise InputError(f"scene.{LAW}", f"missing: name a friction law: {', '.join(known)}")
     if section is not None:
-        section = section._replace(deflections=any(family_of({**LAWS, **own}[law]) is Dynamic for law in names))
+        section = section._replace(deflections=any(family_of({**LAWS, **defined}[law]) is Dynamic for law in names))
     moved = replace(moved, exponent=exponent, section=section, arcs=_arcs(scene, zones, leaves))
     if moved.drive == "table":
-        moved = replace(moved, table=read_samples(doc, scene["drive"], "drive"))
-    if any(f"force.{name}" in leaves for name in TABLE_KEYS["force"]):
-        moved = replace(moved, force=read_samples(doc, scene["force"], "force"))
+        moved = replace(moved, table=own.read_samples(doc, scene["drive"], "drive"))
+    if any(f"force.{name}" in leaves for name in own.TABLE_KEYS["force"]):
+        moved = replace(moved, force=own.read_samples(doc, scene["force"], "force"))
     structures = {
-        law: replace(moved, law=law, own_law=own.get(law), curve=curve if law == TABLE_LAW else None) for law in names
+        law: replace(moved, law=law, own_law=defined.get(law), curve=curve if law == own.TABLE_LAW else None)
+        for law in names
     }
     values = _read_numbers(structures, leaves, swept)
     _warn_of_unused_numbers(structures, leaves)
@@ -148,11 +140,11 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
     """Structure without a friction law: the drive, what formulas move the drive and the body, and impact."""
     drive = "none"
     if "drive" in scene:
-        names = dict.fromkeys([*DRIVES, FORMULA])
+        names = dict.fromkeys([*DRIVES, own.FORMULA])
         drive = choose(names, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
     impact = model in WITH_IMPACT and ("impact" in scene or any(str(path).startswith("impact.") for path in swept))
-    found = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})), impact=impact)
-    return replace(found, own_force=own_force(scene.get("force"))) if _takes_force(model) else found
+    found = Structure(model, "", drive, own_drive=own.drive_type(model, scene.get("drive", {})), impact=impact)
+    return replace(found, own_force=own.force_type(scene.get("force"))) if _takes_force(model) else found
 
 
 def _takes_force(model: str) -> bool:
@@ -201,7 +193,7 @@ def _warn_of_unused_numbers(structures: Mapping[str, Structure], leaves: Collect
                 problem = "cannot stand beside a table or a formula, which gives all of the force"
                 raise InputError(f"scene.{path}", problem)
             law = f"drive law {first.drive}" if section == "drive" else f"friction law {' or '.join(structures)}"
-            warn_once("scene.%s is not used: %s has no such parameter%s", path, law, laws_with(path))
+            warn_once("scene.%s is not used: %s has no such parameter%s", path, law, own.laws_with(path))
 
 
 def _warn_of_lengths(lengths: Mapping[str, float]) -> None:
@@ -231,28 +223,28 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
     """Paths of a scene that are no numeric parameters."""
     yield from ("model", LAW, "drive.law", "friction.laws")
     takes_force = _takes_force(model)
-    by_formula = {"friction.mu": FORMULA in laws, "friction.at_rest": FORMULA in laws}
-    by_formula |= {"drive.theta": drive == FORMULA, "force.formula": takes_force}
+    by_formula = {"friction.mu": own.FORMULA in laws, "friction.at_rest": own.FORMULA in laws}
+    by_formula |= {"drive.theta": drive == own.FORMULA, "force.formula": takes_force}
     yield from (path for path, is_used in by_formula.items() if is_used)
-    by_table = {"drive": drive == "table", "force": takes_force, "friction": TABLE_LAW in laws}
-    yield from (f"{of}.{key}" for of, keys in TABLE_KEYS.items() if by_table[of] for key in keys)
+    by_table = {"drive": drive == "table", "force": takes_force, "friction": own.TABLE_LAW in laws}
+    yield from (f"{of}.{key}" for of, keys in own.TABLE_KEYS.items() if by_table[of] for key in keys)
 
 
 def structures_of(
     model: str,
     laws: Collection[str],
-    own: Mapping[str, type],
+    defined: Mapping[str, type],
     zones: tuple[str, ...],
     drives: Iterable[str],
     **rest: Any,
 ) -> Iterator[Structure]:
     """Structures that together have every number that a scene of a model can have, under some laws and some drives."""
     # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take long.
-    taken = {*MODELS[model].laws, *own}
+    taken = {*MODELS[model].laws, *defined}
     known = [law for law in laws if law in taken]
     all_arcs = product(known, ("none",), ((), ("zone",), zones))
     for law, drive, arcs in (*all_arcs, *((known[0], drive, ()) for drive in drives if drive in DRIVES)):
-        yield Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT, **rest)
+        yield Structure(model, law, drive, arcs, own_law=defined.get(law), impact=model in WITH_IMPACT, **rest)
 
 
 @lru_cache(maxsize=4096)
@@ -276,12 +268,12 @@ class _Keys:
         self,
         moved: Structure,
         laws: Collection[str],
-        own: Mapping[str, type] = MappingProxyType({}),
+        defined: Mapping[str, type] = MappingProxyType({}),
         zones: tuple[str, ...] = ("zones.0",),
-        drives: Collection[str] = (*DRIVES, FORMULA),
+        drives: Collection[str] = (*DRIVES, own.FORMULA),
     ):
-        self.moved, self.own, self.zones = moved, own, zones
-        structures = [*structures_of(moved.model, laws, own, zones, drives, elsewhere=moved.elsewhere)]
+        self.moved, self.defined, self.zones = moved, defined, zones
+        structures = [*structures_of(moved.model, laws, defined, zones, drives, elsewhere=moved.elsewhere)]
         structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
         paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
         for one in structures:
@@ -320,7 +312,7 @@ class _Keys:
             return ": a zone has a center, which is (from + to)/2, and a half_angle, which is (to - from)/2"
         if not section and key in ("solver", "sweep", "record"):
             return f": the section `{key}` stands beside `scene`, not in it: take away its indentation"
-        if len(key) < 2 or not any(str(own).startswith(key) for own in self.children.get(section, ())):
+        if len(key) < 2 or not any(str(known).startswith(key) for known in self.children.get(section, ())):
             if places := self.ending_with(key):
                 return f"; did you mean {places}?"
             for other in MODELS:
@@ -329,7 +321,8 @@ class _Keys:
                 if other != self.moved.model and (places or key in keys.children.get(section, ())):
                     places = places or f"`{section}.{key}`".replace("`.", "`")
                     return f": model {other} has {places}, this is model {self.moved.model}"
-        near = _Keys(self.moved, laws or MODELS[self.moved.model].laws, self.own, self.zones[:1], (self.moved.drive,))
+        laws = laws or MODELS[self.moved.model].laws
+        near = _Keys(self.moved, laws, self.defined, self.zones[:1], (self.moved.drive,))
         known = near.children.get(section, self.children[section])
         numbers = [name for name in known if name != "law"]
         # The only number of a section is the one that is meant, whatever it is called.

@@ -9,14 +9,9 @@ from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
-from ringsweep.config.axes import COUNT
-from ringsweep.config.follow import KEYS as FOLLOW
-from ringsweep.config.options import RECORD, SECTION, options_of
-from ringsweep.config.own import FORMULA, INTERPOLATIONS, LAW_KEYS, TABLE_LAW, TABLES
-from ringsweep.config.refine import KEYS as REFINE
+from ringsweep.config import axes, follow, options, own, refine, uncertain
 from ringsweep.config.scene import structures_of
 from ringsweep.config.sections import Keys
-from ringsweep.config.uncertain import KEYS as SAMPLE
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import ELSEWHERE, LAW
 from ringsweep.physics.drives import DRIVES
@@ -36,19 +31,19 @@ def schema() -> dict[str, Any]:
     """
     known: dict[str, dict[Parameter, None]] = {}
     for model, name in product(MODELS, ELSEWHERE):
-        laws = *MODELS[model].laws, TABLE_LAW
-        for structure in structures_of(model, laws, {TABLE_LAW: Table}, ("zones.0",), DRIVES, elsewhere=name):
+        laws = *MODELS[model].laws, own.TABLE_LAW
+        for structure in structures_of(model, laws, {own.TABLE_LAW: Table}, ("zones.0",), DRIVES, elsewhere=name):
             for path, parameter in parameters(structure).items():
                 # All zones of a list have one description.
                 parameter = dataclasses.replace(parameter, long_name=parameter.long_name.replace("zone 1", "the zone"))
                 known.setdefault(path, {})[parameter] = None
     leaves = {path: _any(*map(_number, meanings)) for path, meanings in known.items()}
-    tables = {f"{of}.{name}": _list(_number(p)) for of, columns in TABLES.items() for name, p in columns.items()}
-    for of, columns in TABLES.items():
+    tables = {f"{of}.{name}": _list(_number(p)) for of, columns in own.TABLES.items() for name, p in columns.items()}
+    for of, columns in own.TABLES.items():
         header = ", ".join(f"{name} ({p.unit})".removesuffix(" (1)") for name, p in columns.items())
         tables[f"{of}.file"] = _text(f"CSV file with columns {header.replace('time', 't')}")
-    by_formula = _keys(LAW_KEYS, mu=_TEXT, at_rest={"enum": [*COEFFICIENTS]})
-    drives = _meanings(DRIVES) | {FORMULA: "A formula of the time, under theta"}
+    by_formula = _keys(own.LAW_KEYS, mu=_TEXT, at_rest={"enum": [*COEFFICIENTS]})
+    drives = _meanings(DRIVES) | {own.FORMULA: "A formula of the time, under theta"}
     scene = _nest(
         {
             "model": _word("what moves", _meanings(MODELS)),
@@ -58,7 +53,7 @@ def schema() -> dict[str, Any]:
             "drive.law": _word("how the ring is driven", drives),
             "force.formula": _text("force on the body, N, as a formula of the time t, s"),
             **tables,
-            **{f"{of}.interpolate": _word("what joins the rows of the table", w) for of, w in INTERPOLATIONS.items()},
+            **{f"{of}.interpolate": _word("what joins the rows", joins) for of, joins in own.INTERPOLATIONS.items()},
             "friction.mu": _any(by_formula["mu"], tables["friction.mu"]),
             "drive.theta": _any(_text("angle or displacement as a formula of the time t, s"), tables["drive.theta"]),
             **leaves,
@@ -69,7 +64,7 @@ def schema() -> dict[str, Any]:
     for section, what in {"friction": "friction law", "drive": "drive", "force": "force"}.items():
         own_parameter = Parameter("", f"parameter of a {what} by formula")
         scene["properties"][section]["additionalProperties"] = _number(own_parameter)
-    record = _section(_keys(RECORD, section=_section(_keys(SECTION), "at")))
+    record = _section(_keys(options.RECORD, section=_section(_keys(options.SECTION), "at")))
     sections = {
         "scene": scene,
         "solver": _solver(),
@@ -103,9 +98,9 @@ def _meanings(registry: Mapping[str, Any]) -> dict[str, str]:
 def _laws(about: str) -> dict[str, Any]:
     """Names of friction laws: those of the package, `formula`, `table`, and names that a user gives."""
     formula, table = "A formula of the sliding speed, under mu", "Measured friction: a file, or lists v and mu"
-    known = _constants(_meanings(LAWS) | {FORMULA: formula, TABLE_LAW: table})
-    own = {"description": "a law of the section laws, or of the Python session", "minLength": 1}
-    return {"description": about, "type": "string", "anyOf": [*known, own]}
+    known = _constants(_meanings(LAWS) | {own.FORMULA: formula, own.TABLE_LAW: table})
+    other = {"description": "a law of the section laws, or of the Python session", "minLength": 1}
+    return {"description": about, "type": "string", "anyOf": [*known, other]}
 
 
 _VALUE, _TEXT, _FLAG = {"type": ["number", "string"]}, {"type": "string"}, {"type": "boolean"}
@@ -167,26 +162,26 @@ def _keys(keys: Keys, **others: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def _solver() -> dict[str, Any]:
     methods: list[dict[str, Any]] = [{"type": "string", "enum": list(METHODS)}]
     for name, about in _meanings(METHODS).items():
-        options = {"method": {"const": name, "description": about}, **_keys(options_of(METHODS[name]))}
-        methods.append(_section(options, "method"))
+        keys = {"method": {"const": name, "description": about}, **_keys(options.options_of(METHODS[name]))}
+        methods.append(_section(keys, "method"))
     return _any(*methods, description="how time advances")
 
 
 def _sweep(paths: list[str]) -> dict[str, Any]:
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
     laws = _list(_laws("friction law"))
-    own = r"^(friction|drive|force)\.[A-Za-z][A-Za-z0-9_]*$"
-    names = {"anyOf": [{"enum": [LAW, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": own}]}
+    parameter = r"^(friction|drive|force)\.[A-Za-z][A-Za-z0-9_]*$"
+    names = {"anyOf": [{"enum": [LAW, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": parameter}]}
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
-    bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(COUNT)], "minItems": 3, "maxItems": 3}
+    bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(axes.COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(_VALUE), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
-    refined = _keys(REFINE, axes=_list(names, maxItems=2))
+    refined = _keys(refine.KEYS, axes=_list(names, maxItems=2))
     grid = "path -> values; every combination is run; paths with commas between them vary together"
     of_laws = {LAW: laws | {"uniqueItems": True}}
     points = "CSV file whose columns are paths and whose rows are runs, or its columns"
     columns = _open("path -> values", _list(_VALUE), propertyNames=names, properties={LAW: laws})
     which = "axis along which each cell starts from the state in which the one before ended"
-    followed = _section(_keys(FOLLOW, axis=_TEXT), "axis")
+    followed = _section(_keys(follow.KEYS, axis=_TEXT), "axis")
     boundaries = "compute only the boundaries of the map: every 32nd cell, then where neighbours differ"
     return _section(
         {
@@ -217,5 +212,5 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
         "survival": axis,
         "sensitivity": {"anyOf": [_FLAG, _section({"of": _list(_TEXT)}, "of")]},
     }
-    found = _section(_keys(SAMPLE, **others), *("n", "of"))
+    found = _section(_keys(uncertain.KEYS, **others), *("n", "of"))
     return {"description": "uncertain parameters: each cell of the grid is sampled", **found}
