@@ -69,7 +69,8 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
     known = own.law_choice(model, defined).names
-    keys = _Keys(moved, known, defined, zones or ("zones.0",))
+    registered = MODELS[model], WITH_IMPACT.get(model), *map(LAWS.get, known), *DRIVES.values()
+    keys = _keys(moved, known, tuple(defined.items()), zones or ("zones.0",), *registered)
     leaves = dict(keys.leaves(scene, names))
     if not names:
         section_of(scene, "friction", "scene.")
@@ -247,12 +248,6 @@ def structures_of(
         yield Structure(model, law, drive, arcs, own_law=defined.get(law), impact=model in WITH_IMPACT, **rest)
 
 
-@lru_cache(maxsize=4096)
-def _paths_under(structure: Structure, *registered: Any) -> tuple[str, ...]:
-    """Paths of the numbers of a scene, for as long as the same types are registered under its names."""
-    return tuple(parameters(structure))
-
-
 class _Keys:
     """Keys that a scene of a model can have, under some laws and some drives.
 
@@ -276,8 +271,7 @@ class _Keys:
         structures = [*structures_of(moved.model, laws, defined, zones, drives, elsewhere=moved.elsewhere)]
         structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
         paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
-        for one in structures:
-            paths |= dict.fromkeys(_paths_under(one, model_of(one), one.law_type, one.drive_type))
+        paths |= dict.fromkeys(path for structure in structures for path in parameters(structure))
         self.known = set(paths)
         self.children: dict[str, dict[str, None]] = {}
         for path in paths:
@@ -335,13 +329,6 @@ class _Keys:
 
 
 @lru_cache(maxsize=16)
-def _keys(
-    model: str,
-    laws: tuple[str, ...],
-    own: tuple[tuple[str, type], ...],
-    zones: tuple[str, ...],
-    moved: Structure,
-    *registered: Any,
-) -> _Keys:
+def _keys(moved: Structure, laws: tuple[str, ...], defined: Any, zones: tuple[str, ...], *registered: Any) -> _Keys:
     """Keys of a scene, found once for as long as the same types are registered under its names."""
-    return _Keys(model, laws, dict(own), zones, moved)
+    return _Keys(moved, laws, dict(defined), zones)
