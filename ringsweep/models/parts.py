@@ -150,7 +150,7 @@ def table_of(
     times, samples : ndarray of shape ``(samples,)``
         Times, s, and the measured quantity.
     interpolate : str
-        What joins the samples; see :data:`ringsweep.config.tables.INTERPOLATIONS`.
+        What joins the samples; see :data:`ringsweep.config.own.INTERPOLATIONS`.
     amplitude : ndarray of shape ``(cells,)``
         Factor on the measured quantity.
     what : str
