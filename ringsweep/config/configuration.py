@@ -14,9 +14,8 @@ from typing import Any
 
 from ringsweep.config import yaml_text
 from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
-from ringsweep.config.follow import Follow, read_follow, with_direction
+from ringsweep.config.neighbours import Follow, Refinement, read_follow, read_refinement, with_direction
 from ringsweep.config.options import read_solver
-from ringsweep.config.refine import Refinement, read_refinement
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import suggestion, warn_once
 from ringsweep.config.uncertain import Sample, read_sample

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
-from ringsweep.config import axes, follow, options, own, refine, uncertain
+from ringsweep.config import axes, neighbours, options, own, uncertain
 from ringsweep.config.scene import structures_of
 from ringsweep.config.sections import Keys
 from ringsweep.models import MODELS, parameters
@@ -175,13 +175,13 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(axes.COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(_VALUE), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
-    refined = _keys(refine.KEYS, axes=_list(names, maxItems=2))
+    refined = _keys(neighbours.REFINE, axes=_list(names, maxItems=2))
     grid = "path -> values; every combination is run; paths with commas between them vary together"
     of_laws = {LAW: laws | {"uniqueItems": True}}
     points = "CSV file whose columns are paths and whose rows are runs, or its columns"
     columns = _open("path -> values", _list(_VALUE), propertyNames=names, properties={LAW: laws})
     which = "axis along which each cell starts from the state in which the one before ended"
-    followed = _section(_keys(follow.KEYS, axis=_TEXT), "axis")
+    followed = _section(_keys(neighbours.FOLLOW, axis=_TEXT), "axis")
     boundaries = "compute only the boundaries of the map: every 32nd cell, then where neighbours differ"
     return _section(
         {

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config
-from ringsweep.config.follow import BOTH, DIRECTION
+from ringsweep.config.neighbours import BOTH, DIRECTION
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import OUTCOMES, Variable
