@@ -220,6 +220,13 @@ def test_history_does_not_replace_the_one_whose_scene_it_takes(folder, capsys):
     assert "run.nc: is the input" in refused(capsys, "simulate", "run.nc", "-o", "./run.nc")
 
 
+def test_history_does_not_replace_the_run_that_it_continues(folder, capsys):
+    (folder / "case.yaml").write_text(TEXT.replace("law: arctan", "law: constant"))
+    assert main(["simulate", "case.yaml", "-q"]) == 0
+    again = "simulate", "case.yaml", "--set", "initial.from=case-run.nc"
+    assert "case-run.nc: is the input" in refused(capsys, *again)
+
+
 def test_run_takes_values_from_the_command_line(folder):
     assert main(["run", "case.yaml", "--set", "time.span=2 s", "--set", "solver.steps=500", "-o", "short.nc"]) == 0
     configuration = json.loads(netcdf.load("short.nc").attrs["configuration"])

@@ -1,15 +1,20 @@
-"""Branches: along an axis each cell starts from the end of the one before."""
+"""Branches: along an axis each cell starts from the end of the one before, and the run of a file goes on."""
 
+import json
 from copy import deepcopy
 
 import numpy as np
 import pytest
+import xarray as xr
 from belts import on_belt, with_all_parts
 
 import ringsweep
-from ringsweep import InputError
+from ringsweep import InputError, cli
 from ringsweep.config import load
 from ringsweep.models import batch
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint
 
 #: A spring that hardens, under a force: near 0.35 Hz a large and a small motion exist side by side.
@@ -159,13 +164,26 @@ class TestTheSameBits:
 
 
 @pytest.mark.slow
-def test_a_deflection_is_a_number_of_the_scene():
-    # The bristles alone pull: m a = -sigma0 z at the first instant.
-    scene = changed(LUGRE, "initial", deflection=1e-3, x=0.0)
-    scene["friction"] |= {"sigma1": 0.0, "sigma2": 0.0}
-    history = ringsweep.simulate(scene)
-    assert history.deflection[0] == 1e-3
-    assert np.isclose(history.friction_force[0], 100.0 * 1e-3)
+class TestAFileGoesOn:
+    @pytest.mark.parametrize("simulated", [False, True])
+    def test_two_runs_are_one_run_of_both_spans(self, simulated, tmp_path):
+        file = tmp_path / "first.nc"
+        if simulated:
+            ringsweep.simulate(deepcopy(LUGRE)).to_netcdf(file)
+        else:
+            run(LUGRE, file).close()
+        second = run(changed(LUGRE, "initial", **{"from": str(file)}))
+        whole = run(changed(LUGRE, "time", span=14.0))
+        for name in "x_end", "velocity_end", "deflection_end":
+            assert np.isclose(second[name], whole[name], rtol=1e-4, atol=1e-7), name
+
+    def test_a_deflection_is_a_number_of_the_scene(self):
+        # The bristles alone pull: m a = -sigma0 z at the first instant.
+        scene = changed(LUGRE, "initial", deflection=1e-3, x=0.0)
+        scene["friction"] |= {"sigma1": 0.0, "sigma2": 0.0}
+        history = ringsweep.simulate(scene)
+        assert history.deflection[0] == 1e-3
+        assert np.isclose(history.friction_force[0], 100.0 * 1e-3)
 
 
 class TestErrors:
@@ -209,8 +227,69 @@ class TestErrors:
         with pytest.raises(InputError, match=f"{2.5 * limit:.6g} m is not allowed: .* up to {2 * limit:.6g} m"):
             batch(scene.structure, columns)
 
-    def test_of_the_initial_state(self):
+    @pytest.mark.slow
+    def test_of_the_initial_state(self, tmp_path):
         self.refused(changed(LUGRE, "initial", deflection=1.0), "scene.initial.deflection", "up to 0.0015 m")
+        beside = changed(LUGRE, "initial", x=1.0, **{"from": "a.nc"})
+        self.refused(beside, "scene.initial.x", "leave one out")
+        self.refused(changed(LUGRE, "initial", **{"from": str(tmp_path / "no.nc")}), "scene.initial.from", "no.nc")
+
+
+class TestFilesThatDoNotGoOn:
+    """Files of runs as `run` writes them, made by hand."""
+
+    @pytest.fixture
+    def file(self, tmp_path):
+        def write(name="first.nc", regime="oscillatory", runs=(), scene=LUGRE, **changed):
+            numbers = {"t_end": 7.0, "x_end": 0.01, "velocity_end": 0.1, "deflection_end": 1e-3} | changed
+            columns = {"regime": np.int8(REGIMES.index(regime))} | numbers
+            ds = xr.Dataset({n: (("run",) * len(runs), np.full(runs, v)) for n, v in columns.items()})
+            ds["regime"].attrs = OUTCOMES["regime"].attributes
+            attributes = {"Conventions": "CF-1.11", "ringsweep_version": "0", "configuration": {"scene": scene}}
+            netcdf.save(ds.assign_attrs(attributes), tmp_path / name)
+            return tmp_path / name
+
+        return write
+
+    def refused(self, file, words):
+        with pytest.raises(InputError) as error:
+            load({"scene": changed(LUGRE, "initial", **{"from": str(file)})})
+        assert error.value.path == "scene.initial.from"
+        assert words in error.value.problem
+
+    def test_sound_file_goes_on(self, file):
+        assert load({"scene": changed(LUGRE, "initial", **{"from": str(file())})}).scene.values["initial.x"] == 0.01
+
+    @pytest.mark.parametrize(
+        ("about", "problem"),
+        [
+            *(({"regime": regime}, f"is {regime}: it has no state") for regime in ("failed", "separating", "jammed")),
+            ({"x_end": np.nan}, "is not the result of a run that can go on"),
+            ({"x_end": "far"}, "is not the result of a run that can go on"),
+            ({"runs": (2,)}, "holds 2 runs"),
+        ],
+    )
+    def test_what_is_no_state_that_could_go_on(self, file, about, problem):
+        self.refused(file(**about), problem)
+
+    @pytest.mark.parametrize("damage", ["changed", "cut"])
+    def test_damaged_bytes(self, file, damage):
+        path = file()
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 1
+        path.write_bytes(content if damage == "changed" else content[:-2000])
+        self.refused(path, "damaged")
+
+    def test_configuration_that_names_itself(self, tmp_path):
+        path = tmp_path / "loop.yaml"
+        path.write_text(json.dumps({"scene": changed(LUGRE, "initial", **{"from": "loop.yaml"})}))
+        self.refused(path, "is no result file")
+
+    def test_results_that_name_each_other(self, file, tmp_path):
+        for one, other in (("a.nc", "b.nc"), ("b.nc", "a.nc")):
+            file(one, scene=changed(LUGRE, "initial", **{"from": str(tmp_path / other)}))
+        self.refused(tmp_path / "a.nc", "a result holds its initial values")
+        assert cli.main(["run", str(tmp_path / "a.nc"), "--dry-run"]) == 2
 
 
 class TestSweepsInPython:

@@ -183,6 +183,16 @@ def test_rocking_ring_has_two_motions_at_one_frequency_chosen_by_the_past():
     assert (apart.values > 0.1).tolist() == [False, False, False, True, False]
 
 
+@pytest.mark.slow
+def test_run_of_a_file_goes_on_from_its_end(tmp_path):
+    file = tmp_path / "first.nc"
+    ringsweep.run({"scene": RIG | {"time": {"span": 7.3}}}, file, jobs=1, progress=False).close()
+    rest = RIG | {"initial": {"from": str(file)}, "time": {"span": 4.7}}
+    second, one = ringsweep.simulate(rest), ringsweep.simulate(RIG | {"time": {"span": 12.0}})
+    assert np.cos(second.phi.values[-1] - one.phi.values[-1]) == pytest.approx(1.0, abs=1e-12)
+    assert second.omega.values[-1] == pytest.approx(one.omega.values[-1], abs=1e-8)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import logging
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
@@ -67,7 +67,7 @@ def run_command(arguments: argparse.Namespace) -> int:
         raise InputError("--scheduler", "is for --backend dask")
     config = load(arguments.config, arguments.set, refine=arguments.refine or None)
     name = f"{config.name}.nc" if arguments.output is None else arguments.output
-    target, picture = _outputs(name, *plan_of(config).kind)
+    target, picture = _outputs(name, *plan_of(config).kind, (config.begins_from,))
 
     if arguments.dry_run:
         from ringsweep.runs.needs import describe
@@ -192,8 +192,8 @@ def simulate_command(arguments: argparse.Namespace) -> int:
     ringsweep simulate my.nc --set drive.amplitude=4     the scene of my.nc, with this amplitude
     """
     config = _single_run(arguments)
-    name = arguments.output or f"{config.name}-run.nc"
-    target, picture = _outputs(name, "time", "history", arguments.config)
+    inputs = arguments.config, config.begins_from
+    target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history", inputs)
 
     from ringsweep.report.text import events_in_words, status_of
     from ringsweep.runs.simulate import history
@@ -237,7 +237,7 @@ def threshold_command(arguments: argparse.Namespace) -> None:
 
     if arguments.output is not None:
         mark = "vertex" if load(arguments.config).sample is None else "threshold"
-        _outputs(arguments.output, mark, "threshold", arguments.config)
+        _outputs(arguments.output, mark, "threshold", [arguments.config])
     asked = arguments.config, arguments.path, arguments.regime, (arguments.low, arguments.high), arguments.tolerance
     options = {"set": arguments.set, "scan": arguments.scan, "jobs": arguments.jobs, "unit": arguments.unit}
     found = threshold(*asked, **options)
@@ -367,7 +367,7 @@ def schema_command(arguments: argparse.Namespace) -> None:
     print(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-def _outputs(name: str, mark: str, content: str, source: str | None = None) -> tuple[Path, Path]:
+def _outputs(name: str, mark: str, content: str, inputs: Iterable[str | None] = ()) -> tuple[Path, Path]:
     """Paths of the dataset and of its picture, checked before any computation.
 
     Parameters
@@ -376,13 +376,13 @@ def _outputs(name: str, mark: str, content: str, source: str | None = None) -> t
         Path of the dataset.
     mark, content : str
         Kind of the result; see :func:`ringsweep.storage.netcdf.check_kind`.
-    source : str, optional
-        File from which the result is computed.
+    inputs : iterable of str, optional
+        Files from which the result is computed.
 
     Raises
     ------
     InputError
-        If one of them cannot be written, or would replace a file that is no result of this kind, or `source`.
+        If one of them cannot be written, or would replace a file that is no result of this kind, or an input.
     """
     from ringsweep.storage import files, netcdf
 
@@ -393,7 +393,7 @@ def _outputs(name: str, mark: str, content: str, source: str | None = None) -> t
         raise InputError(name, "is no name of a dataset: name it *.nc; the picture is beside it")
     files.check_writable(picture)
     if target.exists():
-        if source is not None and target.samefile(source):
+        if any(file is not None and target.samefile(file) for file in inputs):
             raise InputError(str(target), "is the input: name another output")
         netcdf.check_kind(target, mark, content)
     return target, picture

@@ -14,6 +14,7 @@ from typing import Any
 
 from ringsweep.config import yaml_text
 from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
+from ringsweep.config.continued import put_state, run_to_continue
 from ringsweep.config.neighbours import Follow, Refinement, read_follow, read_refinement, with_direction
 from ringsweep.config.options import read_solver
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
@@ -55,6 +56,8 @@ class Config:
         Uncertain parameters, which vary within each cell of the axes; None if there are none.
     follow : Follow, optional
         Axis along which each cell starts from the end of the one before; None if all start from ``initial``.
+    begins_from : str, optional
+        File that ``initial.from`` names.
     """
 
     scene: Scene
@@ -65,6 +68,7 @@ class Config:
     refine: Refinement | None = None
     sample: Sample | None = None
     follow: Follow | None = None
+    begins_from: str | None = None
 
     @property
     def certifies(self) -> bool:
@@ -190,6 +194,12 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         if path.removeprefix("scene.") in swept:
             raise InputError(path, "is swept here: --set changes values that all cells share")
     laws = next(((where, given) for path, where, _, given in columns if path == LAW), None)
+    if (file := run_to_continue(doc)) is not None:
+        try:
+            before = load(file)
+        except InputError as error:
+            raise InputError("scene.initial.from", f"{file}: {error.problem}") from None
+        put_state(doc, parse_scene(doc, swept, laws), file, before.scene, before.axes, swept)
     scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = build_axes(scene, columns)
@@ -210,7 +220,7 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         raise InputError(excluding[0], f"cannot stand beside {excluding[1]}: leave one of them out")
     _tell_units(changed, scene)
     axes = with_direction(axes, follow)
-    return Config(scene, solver, axes, tree, doc.name, refine, sample, follow)
+    return Config(scene, solver, axes, tree, doc.name, refine, sample, follow, begins_from=file)
 
 
 def _warn_of_plain_angles(scene: Scene, columns: Iterable[Given]) -> None:

@@ -165,7 +165,7 @@ def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
     if DIRECTION in axes.sizes:
         raise InputError(where, f"the dimension {DIRECTION} of the sweep has the name of that of a followed one")
     for structure in scene.structures.values():
-        _check_continues(structure, where)
+        check_continues(structure, where)
     return Follow(path, section["direction"])
 
 
@@ -176,7 +176,7 @@ def with_direction(axes: Axes, follow: Follow | None) -> Axes:
     return Axes({**axes.sizes, DIRECTION: len(follow.ways)}, axes.columns)
 
 
-def _check_continues(structure: Structure, where: str) -> None:
+def check_continues(structure: Structure, where: str) -> None:
     """Raise an error, located at `where`, unless runs of a scene can start from the end of another one."""
     model = model_of(structure)
     if not isinstance(model, Continues):

@@ -51,6 +51,7 @@ def schema() -> dict[str, Any]:
             "friction.laws": _open("friction laws by formula: name -> mu, at_rest", _section(by_formula, "mu")),
             "friction.at_rest": by_formula["at_rest"],
             "drive.law": _word("how the ring is driven", drives),
+            "initial.from": _text("result file of the run on the belt that goes on"),
             "force.formula": _text("force on the body, N, as a formula of the time t, s"),
             **tables,
             **{f"{of}.interpolate": _word("what joins the rows", joins) for of, joins in own.INTERPOLATIONS.items()},

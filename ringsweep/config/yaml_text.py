@@ -23,6 +23,7 @@ import yaml
 from ringsweep.errors import InputError
 from ringsweep.quantities import trailer
 from ringsweep.quantities.units import LONG_INTEGER, NUMBER, show, spelled
+from ringsweep.quantities.variables import written
 
 logger = logging.getLogger("ringsweep")
 
@@ -207,6 +208,8 @@ def _read_result(file: Path) -> Document:
         tree = json.loads(content.getncattr("configuration"))
         if not isinstance(tree, dict):
             raise ValueError("a configuration is a mapping")
+        if "from" in (written(tree, "initial") or {}):
+            raise InputError("", "is damaged: a result holds its initial values")
         columns = None
         if "regime" in content.variables and not {"time", "contender", "word"} & set(content.dimensions):
             dims = content["regime"].dimensions

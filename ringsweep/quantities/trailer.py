@@ -104,7 +104,9 @@ def telling_damage(path: str | os.PathLike[str], what: str = "a NetCDF file") ->
 
 
 @contextmanager
-def opened(path: str | os.PathLike[str], what: str = "a NetCDF file") -> Iterator[netCDF4.Dataset]:
+def opened(
+    path: str | os.PathLike[str], *, whole: bool = False, what: str = "a NetCDF file"
+) -> Iterator[netCDF4.Dataset]:
     """An open NetCDF file whose seal fits, if it has one, for a block as of :func:`telling_damage`.
 
     Raises
@@ -114,7 +116,7 @@ def opened(path: str | os.PathLike[str], what: str = "a NetCDF file") -> Iterato
         it cannot be read.
     """
     with telling_damage(path, what):
-        sealed = check(path, whole=False)
+        sealed = check(path, whole=whole)
         with netCDF4.Dataset(Path(path).resolve()) as file:
             regime = file.variables.get("regime")
             if regime is not None and (cells := math.prod(regime.shape)) > MAX_CELLS:
