@@ -40,7 +40,15 @@ def period_of(structure: Structure, period: NDArray[np.float64]) -> NDArray[np.f
 
 
 class Continues(ABC):
-    """A model of which a run can start from the state in which another one ended."""
+    """A model of which a run can start from the state in which another one ended.
+
+    Attributes
+    ----------
+    ends : tuple of str
+        Outcomes that are the state at the end; under a law with bristles ``deflection_end`` besides.
+    """
+
+    ends: ClassVar[tuple[str, ...]]
 
     def obstacle(self, structure: Structure) -> str | None:
         """Why runs of this structure cannot go on, for an error message; None if they can."""

@@ -44,6 +44,7 @@ class Belt(Model, Continues):
     """A mass on a spring on a moving belt (the paper's Fig. 1)."""
 
     name: ClassVar[str] = "belt"
+    ends: ClassVar[tuple[str, ...]] = ("x_end", "velocity_end")
     doc: ClassVar[str] = "a mass on a spring on a moving belt"
     reference: ClassVar[str] = (
         "K. Popp, P. Stelter, Stick-slip vibrations and chaos, Philosophical Transactions of the Royal Society A 332, "

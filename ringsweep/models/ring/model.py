@@ -50,6 +50,7 @@ class SingleContactRing(Model, Continues):
     reference: ClassVar[str] = PAPER
     outcomes: ClassVar[tuple[str, ...]] = record.Outcome._fields
     place: ClassVar[str] = "phi"
+    ends: ClassVar[tuple[str, ...]] = ("phi_end", "omega_end")
     driven: ClassVar[tuple[str, ...]] = ("theta",)
     absent: ClassVar[frozenset[str]] = _OF_CONTACT_2
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
