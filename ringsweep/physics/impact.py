@@ -390,20 +390,19 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
             o_1, s_1 = before[0] + _change(rows[0], impulse), before[1] + _change(rows[1], impulse)
             o_2, s_2 = before[2] + _change(rows[2], impulse), before[3] + _change(rows[3], impulse)
             # The law once more, from the impulses and the velocities.
-            violation = 0.0
+            wrong = 0.0
             for touches, n, along, opens, slides, aim, coefficient, unit in (
                 (touching[0], n_1, t_1, o_1, s_1, aims[0], mu[0], unit_1),
                 (touching[1], n_2, t_2, o_2, s_2, aims[1], mu[1], unit_2),
             ):
                 if touches:
-                    wrong = max(-unit * n, aim - opens)
+                    wrong = max(wrong, max(-unit * n, aim - opens))
                     wrong = max(wrong, min(unit * n, opens - aim))
                     wrong = max(wrong, unit * (abs(along) - coefficient * n))
                     # What slides feels all of its friction, against the slip.
                     short = unit * (coefficient * n + along * (1.0 if slides > 0.0 else -1.0))
                     wrong = max(wrong, min(abs(slides), abs(short)))
-                    violation = max(violation, wrong / speed)
-            if not violation * speed <= rough:
+            if not wrong <= rough:
                 continue
             o_1, o_2 = (0.0 if abs(o_1) <= rough else o_1), (0.0 if abs(o_2) <= rough else o_2)
             s_1, s_2 = (0.0 if abs(s_1) <= rough else s_1), (0.0 if abs(s_2) <= rough else s_2)
@@ -419,7 +418,7 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
             )
             if max(abs(n_1), abs(n_2)) <= least_impulse:
                 loss = 0.0
-            violation = max(violation, -loss * unit_mass / speed / speed)
+            violation = max(wrong / speed, -loss * unit_mass / speed / speed)
             best = Impulses(solutions, n_1, t_1, n_2, t_2, o_1, s_1, o_2, s_2, loss, violation)
     return best
 
