@@ -203,8 +203,6 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = build_axes(scene, columns)
-    if doc.columns is None and doc.locations:
-        _warn_of_plain_angles(scene, columns)
     for path, where in swept.items():
         if where in doc.locations:
             doc.locations[f"scene.{path}"] = doc.locations[where]
@@ -218,14 +216,18 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     excluding = [path for path, part in parts.items() if part is not None]
     if len(excluding) > 1:
         raise InputError(excluding[0], f"cannot stand beside {excluding[1]}: leave one of them out")
-    _tell_units(changed, scene)
+    # Axes that a program gives are in SI units.
+    _warn_of_units(scene, changed, columns if doc.columns is None and doc.locations else ())
     axes = with_direction(axes, follow)
     return Config(scene, solver, axes, tree, doc.name, refine, sample, follow, begins_from=file)
 
 
-def _warn_of_plain_angles(scene: Scene, columns: Iterable[Given]) -> None:
-    """Warn of angles of many turns among the axes that a file gives. Axes that a program gives are in SI units."""
+def _warn_of_units(scene: Scene, changed: Mapping[str, tuple[Any, Any]], columns: Iterable[Given]) -> None:
+    """Say where a unit may be missing: in what a user has changed, and in angles of many turns on an axis."""
     known = sweepable(scene)
+    for full, (before, value) in changed.items():
+        if (path := full.removeprefix("scene.")) in known:
+            tell_unit("--set", f"{path}={{}}", value, before, known[path])
     for path, _, _, given in columns:
         # Of linspace and geomspace, first and last.
         for value in next(iter(given.values()))[:2] if isinstance(given, dict) else given:
@@ -250,15 +252,6 @@ def _apply_settings(doc: Document, settings: Iterable[Setting]) -> dict[str, tup
         before, _ = changed.get(full, (before, None))
         changed[full] = before if isinstance(setting, str) else None, value
     return changed
-
-
-def _tell_units(changed: Mapping[str, tuple[Any, Any]], scene: Scene) -> None:
-    """Say in which unit a number is taken that a user has put in the place of one with another unit."""
-    known = sweepable(scene)
-    for full, (before, value) in changed.items():
-        path = full.removeprefix("scene.")
-        if path in known:
-            tell_unit("--set", f"{path}={{}}", value, before, known[path])
 
 
 def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parameter | Choice) -> None:

@@ -237,7 +237,7 @@ def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
     for name, over in ratios.items():
         where = f"sweep.sample.of.{name}.over"
         if over in ratios:
-            raise InputError(where, f"{over} is itself drawn over {ratios[over]}: name the number behind both")
+            raise InputError(where, f"{over} is itself drawn over {ratios[over]}: draw both as rows of a file")
         if over not in {*scene.values, *axes.columns, *drawn}:
             raise InputError(where, f"{over} has no value in the scene, and no distribution")
     return tuple(sorted(found, key=lambda factor: factor.over is not None))
