@@ -174,7 +174,7 @@ def relaxes(scene, linear, frequency):
     the decay itself.
     """
     acceleration, decay = linear[0][1], -linear[1][1][1]
-    return decay > 10.0 * frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
+    return decay > 20.0 * frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
 
 
 @region_guards.implements(Ring, Belt)
