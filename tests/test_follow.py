@@ -245,7 +245,11 @@ class TestFilesThatDoNotGoOn:
             columns = {"regime": np.int8(REGIMES.index(regime))} | numbers
             ds = xr.Dataset({n: (("run",) * len(runs), np.full(runs, v)) for n, v in columns.items()})
             ds["regime"].attrs = OUTCOMES["regime"].attributes
-            attributes = {"Conventions": "CF-1.11", "ringsweep_version": "0", "configuration": json.dumps({"scene": scene})}
+            attributes = {
+                "Conventions": "CF-1.11",
+                "ringsweep_version": "0",
+                "configuration": json.dumps({"scene": scene}),
+            }
             netcdf.save(ds.assign_attrs(attributes), tmp_path / name)
             return tmp_path / name
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from ringsweep.config import yaml_text
 from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
-from ringsweep.config.continued import put_state, run_to_continue
+from ringsweep.config.continued import FROM, put_state, run_to_continue
 from ringsweep.config.neighbours import Follow, Refinement, read_follow, read_refinement, with_direction
 from ringsweep.config.options import read_solver
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
@@ -196,10 +196,11 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     laws = next(((where, given) for path, where, _, given in columns if path == LAW), None)
     if (file := run_to_continue(doc)) is not None:
         try:
-            before = load(file)
+            put_state(doc, parse_scene(doc, swept, laws), file, load(file), swept)
         except InputError as error:
-            raise InputError("scene.initial.from", f"{file}: {error.problem}") from None
-        put_state(doc, parse_scene(doc, swept, laws), file, before.scene, before.axes, swept)
+            if file not in (error.file, error.path):
+                raise
+            raise InputError(FROM, f"{file}: {error.problem}") from None
     scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = build_axes(scene, columns)
