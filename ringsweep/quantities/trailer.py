@@ -104,9 +104,7 @@ def telling_damage(path: str | os.PathLike[str], what: str = "a NetCDF file") ->
 
 
 @contextmanager
-def opened(
-    path: str | os.PathLike[str], *, whole: bool = False, what: str = "a NetCDF file"
-) -> Iterator[netCDF4.Dataset]:
+def opened(path: str | os.PathLike[str], what: str = "a NetCDF file", whole: bool = False) -> Iterator[netCDF4.Dataset]:
     """An open NetCDF file whose seal fits, if it has one, for a block as of :func:`telling_damage`.
 
     Raises
