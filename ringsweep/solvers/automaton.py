@@ -19,7 +19,7 @@ from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, modes, recorder, series, simpler, variation
 from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, RUNNING
 from ringsweep.numerics.clock import Instant, later
-from ringsweep.physics import drives
+from ringsweep.physics import drives, ring
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import StepControl, implicit_step, start_at, start_control
@@ -52,8 +52,9 @@ class LocalErrors(NamedTuple):
     series : float
         Sum over the steps of series, in units of the tolerance.
     rate : float
-        The same for the velocity in stick, 1/s: the tolerance applies to the place alone. The error is the difference
-        from the velocity of the drive at the end of the step.
+        The same for the rate of the place, rad/s, or on a belt m/s: in stick, where the tolerance applies to the place
+        alone and the error is the difference from the velocity of the drive at the end of the step; and on bristles,
+        where the tolerance of the velocity is relative to the sliding velocity.
     implicit : float
         Sum over the implicit steps, in units of the tolerance.
     """
@@ -61,12 +62,6 @@ class LocalErrors(NamedTuple):
     series: float
     rate: float
     implicit: float
-
-
-@inlined
-def _after_creep(local, error):
-    """Local errors after one more implicit step, whose :class:`LocalErrors` share is `error`."""
-    return LocalErrors(local.series, local.rate, local.implicit + error)
 
 
 class Run(NamedTuple):
@@ -128,7 +123,7 @@ def _step_if_stiff(scene, run, h_max, tolerance, scratch):
     """
     start, control = start_at(scene, scratch.course, run.mode, run.now, run.y), run.control
     if not implicit.is_stiff(scene, run.mode, run.y, start.linear):
-        return False, -1, 0.0, run.y, run.record, control, 0.0
+        return False, -1, 0.0, run.y, run.record, control, (0.0, 0.0)
     if control.last_h == 0.0:
         # The transient into creep decays at this rate.
         control = start_control(min(control.h, -1.0 / start.linear[1][1][1]))
@@ -164,11 +159,11 @@ def _step_by_stiffness(family, scene, run, h_max, tolerances, scratch):
         is_stiff, guard, s, y, record, control, error = _step_if_stiff(scene, run, h_max, tolerances[1], scratch)
         if is_stiff:
             record = _goes_on(scene, run, guard, record)
-            return True, guard, s, y, record, control, _after_creep(run.local, error)
+            local = LocalErrors(run.local.series, 0.0, run.local.implicit + error[0])
+            return True, guard, s, y, record, control, local
     guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch)
-    local, record = run.local, _goes_on(scene, run, guard, record)
-    local = LocalErrors(local.series + shared, local.rate, local.implicit)
-    return False, guard, s, y, record, start_control(scene.span), local
+    local = LocalErrors(run.local.series + shared, 0.0, run.local.implicit)
+    return False, guard, s, y, _goes_on(scene, run, guard, record), start_control(scene.span), local
 
 
 @_step_of_family.implements(Dynamic)
@@ -178,7 +173,8 @@ def _step_implicitly(family, scene, run, h_max, tolerances, scratch):
     guard, s, y, record, control, error = implicit_step(
         scene, run.record, start, run.control, h_max, tolerances[1], scratch
     )
-    return True, guard, s, y, record, control, _after_creep(run.local, error)
+    rate = error[1] / (ring.radius(scene.body) * tolerances[1])
+    return True, guard, s, y, record, control, LocalErrors(0.0, run.local.rate + rate, run.local.implicit + error[0])
 
 
 @feature("_step_of_family(family(scene.law), scene, run, h_max, tolerances, scratch)", of=simpler.PARTED, absorb=True)

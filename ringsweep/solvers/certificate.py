@@ -230,6 +230,7 @@ def errors(
     floor: Any = 0.0,
     rate_floor: Any = 0.0,
     force_floor: float = 0.0,
+    friction_floor: Any = 0.0,
 ) -> NDArray[np.float64]:
     """Bounds on the errors of runs, from second runs at another resolution.
 
@@ -250,6 +251,8 @@ def errors(
         velocities have in addition.
     force_floor : float
         Relative error that forces and jumps have in addition.
+    friction_floor : float or ndarray of shape ``(cells,)``
+        Relative error that friction itself has in addition.
 
     Returns
     -------
@@ -270,6 +273,8 @@ def errors(
                 bound[:, k] += rate_floor * (scale[:, place] if "rad" in units else 1.0)
             if names[k] in _FORCES:
                 bound[:, k] += force_floor * scale[:, k]
+            if names[k] == "force_max":
+                bound[:, k] += friction_floor * scale[:, k]
     # A run that reaches the end of the span has an exact time of its end.
     one, _ = runs.named
     reached = one.regime == one.motion

@@ -18,6 +18,7 @@ from ringsweep.numerics.clock import Instant, later
 from ringsweep.numerics.series import ORDER, ascending, crossings, differentiate
 from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
+from ringsweep.solvers.steps import FACTOR
 from ringsweep.solvers.variation import along_implicit, enter_implicit
 
 # Parts into which a step is divided to look for roots of the guards, and for extremes.
@@ -245,8 +246,9 @@ def _fraction_below_zero(samples, work):
     return 0.0 if count == 0 else 1.0 if count == 1 else 0.5 * (roots[0] + roots[1])
 
 
-# Largest factor by which the length of a step grows.
-_MOST_GROWTH = 30.0
+# Largest factor by which the length of a step grows; and factor by which a run at the looser tolerance of a certificate
+# may take longer steps.
+_MOST_GROWTH, _LONGER = 30.0, FACTOR**0.2
 
 
 class StepControl(NamedTuple):
@@ -261,7 +263,7 @@ class StepControl(NamedTuple):
     last_factor : float
         Factor by which the last accepted step could have been longer.
     shared : bool
-        Whether a run at a looser tolerance would try the same length: since the start the tolerance limited no step.
+        Whether a run at a looser tolerance tries the same length: since the start its growth alone limited its steps.
     """
 
     h: float
@@ -289,7 +291,7 @@ def _next_control(control, s, error, shortened, rejected):
     # Towards the end of a creep, steps shorten at a steady rate, which the last step shows (Gustafsson).
     if control.last_h > 0.0:
         h = min(h, s * 0.9 * s / control.last_h * (factor * factor / control.last_factor))
-    shared = control.shared and h == s * _MOST_GROWTH
+    shared = control.shared and 0.9 * factor * _LONGER >= _MOST_GROWTH
     # A shortened step says little about the next one.
     if shortened:
         return StepControl(max(control.h, h), control.last_h, control.last_factor, shared)
@@ -317,8 +319,8 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     -------
     tuple
         The guard that ended the step, or -1; length of the step, s, negative if no step was accepted; state, record and
-        control after it; norm of its error, in units of the tolerance, if something else than the tolerance limited its
-        length, 0 otherwise.
+        control after it; norm of its error, in units of the tolerance, and the error of the velocity, in m/s, if
+        something else than the tolerance limited its length, zeros otherwise.
     """
     mode, now, y, x, forcing, common, linear = start
     course, bends = scratch.course, scratch.bends[0]
@@ -353,13 +355,13 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             break
         near = False
     else:
-        return -1, -1.0, y, record, control, 0.0
+        return -1, -1.0, y, record, control, (0.0, 0.0)
     shared = h < s or s == h_max or control.shared
     control = _next_control(control, s, error_norm, s == h_max, s < min(control.h, h_max))
     if event >= 0:
         event += scratch.first_guard
         if h == 0.0:
-            return event, 0.0, y, record, control, 0.0
+            return event, 0.0, y, record, control, (0.0, 0.0)
     fractions = scratch.work[0]
     record = recorder.enter(scene, record, now.t, implicit.seen(scene, before))
     count, looks = _add_extremes(scene, record, start, scratch, taken, (before, middle, after))
@@ -391,7 +393,8 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             scene, record, later(now, fraction * h).t, duration, stuck, implicit.seen(scene, view)
         )
         fraction_before = fraction
-    return event, h, implicit.from_implicit(scene, end, x_next), record, control, h_norm if shared else 0.0
+    error_if_shared = (h_norm, abs(error[1])) if shared else (0.0, 0.0)
+    return event, h, implicit.from_implicit(scene, end, x_next), record, control, error_if_shared
 
 
 @inlined

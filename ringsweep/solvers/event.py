@@ -121,9 +121,11 @@ class _Piecewise(Method):
         new = Results(rows[open_cells], steps[open_cells], audits[open_cells])
         for retry in range(_MOST_RETRIES + 1):
             runs = TwoRuns(_select(batch, open_cells), new.rows, second_rows, outcomes)
-            because[open_cells], bounds[open_cells], distance[open_cells], may_converge = finer._compare(
+            because[open_cells], found, distance[open_cells], may_converge = finer._compare(
                 runs, new.steps, new.audits, distance[open_cells], looser
             )
+            # Two runs may be close by chance: errors shrink no faster than the tolerance, so the bound does not either.
+            bounds[open_cells] = np.maximum(found, np.nan_to_num(bounds[open_cells]) / FACTOR)
             if retry == 0:
                 same = open_cells[took_same_steps(runs)]
                 because[same] = np.where(because[same] == CERTIFIED, SAME_STEPS, because[same])
@@ -173,7 +175,9 @@ class _Piecewise(Method):
         tolerance, implicit_tolerance = self.tolerances()
         local = LocalErrors(*audits[:, 3:].T)
         if of_bristles:
-            floor, force_floor = implicit_tolerance * (_ONCE_IMPLICIT + _SHARED_BRISTLES * local.implicit), 0.0
+            floor = implicit_tolerance * (_ONCE_IMPLICIT + _SHARED_BRISTLES * local.implicit)
+            force_floor, friction_floor = 0.0, np.zeros(len(steps))
+            rate_floor = implicit_tolerance * _SHARED_BRISTLES * local.rate
         else:
             # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
             ratio = tolerance ** (1.0 / ORDER)
@@ -181,6 +185,9 @@ class _Piecewise(Method):
             floor = remainder * (_ONCE + _SHARED * local.series)
             force_floor = _SHARE_OF_REACTIONS * REACTION_TOLERANCE * remainder
             floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
+            # In the stiction band the error of the velocity, a share of the band, is that of friction, a share of it.
+            friction_floor = np.where(local.implicit > 0.0, implicit_tolerance, 0.0)
+            rate_floor = tolerance * local.rate
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         _, magnified, left_out = audit.of_events(batch, runs.named[0])
         is_constant = family_of(type(batch.law)) is SetValued and not varies(take(batch, 0).law, 0)
@@ -194,8 +201,9 @@ class _Piecewise(Method):
             share=share,
             steps=steps,
             floor=floor + left_out,
-            rate_floor=tolerance * local.rate,
+            rate_floor=rate_floor,
             force_floor=force_floor,
+            friction_floor=friction_floor,
         )
         may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])
         return because, bounds, np.where(diverge, distance, np.inf), may_converge
