@@ -23,9 +23,8 @@ from ringsweep.solvers.rk4 import RK4
 NAMES = MODELS["ring"].outcomes
 COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for name in ("mu_s", "mu_k")]
 
-#: Random scenes with errors that two runs share: a mode that lasts for one step; a long step of a slow creep; the end of
-#: the elastic range of bristles within a step; a sliding velocity that is large beside those in space; creep that steps
-#: cross in one; and runs that are close by chance.
+#: Random scenes with errors that two runs share: a mode that lasts for one step; a long step of a slow creep; the end
+#: of the elastic range of bristles within a step; a fast slide of a slow body; and runs that are close by chance.
 BOUNDED = [
     (101, Kind("ring", "hyperbolic", "sinusoidal", arcs=1)),
     (201, Kind("ring", "tanh", "sinusoidal", arcs=1)),
