@@ -254,8 +254,8 @@ class TestErrors:
             (Event(), "stiction", "arctan", 150, 400),
             # Most steps end at events, so that a run at a looser tolerance takes the same steps.
             (Event(rtol=1e-5), "stiction", "arctan", 100, 300),
-            (Implicit(), "bengisu-akay", "arctan", 300, 400),
-            (Implicit(), "bengisu-akay", "power", 700, 900),
+            (Implicit(), "bengisu-akay", "arctan", 400, 500),
+            (Implicit(), "bengisu-akay", "power", 800, 1000),
         ],
     )
     def test_error_bounds_cover_the_true_errors(self, cells, method, law, drive, median, median_of_all):
