@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from rings import course, rubs, shape
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
 from solutions import cell_of, made, motion
 
 import ringsweep
@@ -452,6 +453,16 @@ class TestBand:
         assert stiction_band(made(define(Definition("mu_s*v/(w + v)")), w=0.01)) == pytest.approx(0.09, rel=1e-12)
         law = made(define(Definition("mu_s*tanh(v/w)")), w=0.01)
         assert stiction_band(law) == pytest.approx(0.01 * math.atanh(math.sqrt(0.99)), rel=1e-12)
+
+    def test_band_of_a_law_without_slope_at_rest_ends_beyond_its_steepest(self):
+        """The slope of v^2/(w^2 + v^2) is 2 v w^2/(w^2 + v^2)^2, which is greatest at w/sqrt(3)."""
+
+        def slope(x):
+            return x / (1.0 + x * x) ** 2
+
+        end = brentq(lambda x: slope(x) - 0.01 * slope(1.0 / math.sqrt(3.0)), 1.0, 100.0, xtol=1e-13)
+        law = made(define(Definition("mu_s*v**2/(v**2 + w**2)")), w=0.01)
+        assert stiction_band(law) == pytest.approx(0.01 * end, rel=1e-11)
 
     @pytest.mark.slow
     def test_word_does_not_depend_on_a_grid(self):

@@ -367,7 +367,8 @@ def first_flat(
         before = np.concatenate([np.full((len(rows), 1), -np.inf), certain[:, :-1]], axis=1)[at]
         # Where friction is no number it grows no more.
         flat = ((high <= share * before) & (before > 0.0)) | np.isnan(low)
-        grows = (low > share * possible) | (possible <= VANISHING)
+        # The slope may be zero at rest, where friction has yet to grow.
+        grows = (low > share * possible) | (possible <= VANISHING) | (cells.high <= SLOWEST)
         # The first interval in which the slope may have fallen so far.
         stops = np.zeros(shape, dtype=bool)
         stops[at] = ~grows
