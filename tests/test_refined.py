@@ -158,7 +158,7 @@ class TestContinuation:
         assert cli.main(["run", str(config), "-o", str(target)]) == 0
         given = yaml.safe_load(config.read_text())
         del given["sweep"]["refine"]
-        with pytest.raises(ringsweep.InputError, match=r"sweep\.refine was .*stride: 8"):
+        with pytest.raises(ringsweep.InputError, match=r"sweep\.refine\.stride was 8, is absent"):
             ringsweep.run(given, target, progress=False)
 
 
@@ -169,7 +169,7 @@ class TestReuse:
         target.write_bytes(full.read_bytes())
         for output in ([], ["-o", f"../{tmp_path.name}/full.nc"]):
             assert cli.main(["run", "full.nc", "--refine", *output]) == 2
-            assert "full.nc: holds another sweep: sweep.refine.dims was absent" in capsys.readouterr().err
+            assert "full.nc: holds another sweep: sweep.refine.axes was absent" in capsys.readouterr().err
             assert target.read_bytes() == full.read_bytes()
 
     @pytest.mark.slow

@@ -185,8 +185,8 @@ class TestContinuation:
         done, ended, events = iter(range(6)), threading.Event(), []
 
         @contextmanager
-        def watched(under_way):
-            with stop_on_interrupt(under_way) as stopped:
+        def watched():
+            with stop_on_interrupt() as stopped:
                 events.append(stopped)
                 yield stopped
 

@@ -33,7 +33,7 @@ class Refinement:
 
     Attributes
     ----------
-    dims : tuple of str
+    axes : tuple of str
         Dimensions that are refined, one or two; along the others the map is a stack.
     stride : int
         Cells from one cell of the first round to the next.
@@ -41,7 +41,7 @@ class Refinement:
         Share of the inferred cells that is computed after all.
     """
 
-    dims: tuple[str, ...]
+    axes: tuple[str, ...]
     stride: int
     audit: float
 

@@ -81,10 +81,10 @@ class Refined(Grid):
         positions in the layout.
         """
         asked, sizes = self.asked, self.config.axes.sizes
-        dims = [*(dim for dim in sizes if dim not in asked.dims), *asked.dims]
+        dims = [*(dim for dim in sizes if dim not in asked.axes), *asked.axes]
         grid = tuple(sizes[dim] for dim in dims)
-        rows, columns = [*(sizes[dim] for dim in asked.dims), 1][:2]
-        layers = math.prod(grid[: len(grid) - len(asked.dims)])
+        rows, columns = [*(sizes[dim] for dim in asked.axes), 1][:2]
+        layers = math.prod(grid[: len(grid) - len(asked.axes)])
         order = [dims.index(dim) for dim in sizes]
 
         def run_cells(cells: NDArray[np.intp]) -> NDArray[np.int16]:
@@ -151,5 +151,5 @@ class Refined(Grid):
             "audit_bound": audit.bound,
             "audit_seed": SEED,
             "audit": words,
-            "refined_dimensions": json.dumps(self.asked.dims),
+            "refined_dimensions": json.dumps(self.asked.axes),
         }
