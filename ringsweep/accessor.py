@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,8 +40,10 @@ class Accessor:
 
         return words(self._ds[var])
 
-    def where(self, **classes: str) -> xr.Dataset:
+    def where(self, **classes: str | Sequence[str]) -> xr.Dataset:
         """The cells of some classes, such as ``regime="separating"``; the others are NaN, as with `where` of xarray.
+
+        Several words, such as ``regime=["sliding", "riding"]``, keep the cells of any of them.
 
         Raises
         ------
@@ -52,9 +54,12 @@ class Accessor:
         from ringsweep.quantities.variables import meanings_of
 
         found = self._ds
-        for name, word in classes.items():
+        for name, given in classes.items():
             known = self.words(resolve("where", name, self._ds))
-            found = found.where(known == resolve(name, word, meanings_of(self._ds[name]).values()))
+            each = given if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+            found = found.where(
+                known.isin([resolve(name, str(one), meanings_of(self._ds[name]).values()) for one in each])
+            )
         return found
 
     def to_frame(self, along: str | None = None) -> pd.DataFrame:

@@ -39,7 +39,10 @@ def test_where_keeps_the_cells_of_classes_and_refuses_unknown_words(ds):
     xr.testing.assert_equal(lost.t_separation, ds.t_separation.where(inside))
     assert int(lost.regime.count()) == int(inside.sum()) > 0
     assert ringsweep.words(lost.regime).values[inside.values].tolist() == ["separating"] * int(inside.sum())
+    either = ds.ringsweep.where(regime=["separating", "oscillatory"]).regime.notnull()
+    assert (either == ringsweep.words(ds.regime).isin(["separating", "oscillatory"])).all()
     for wrong, message in (
+        ({"certified": 1}, "certified"),
         ({"regime": "separeting"}, "did you mean separating"),
         ({"regim": "separating"}, "did you mean regime"),
         ({"t_end": "separating"}, "t_end"),

@@ -105,6 +105,20 @@ class TestRounding:
         assert float(found.period[0]) == pytest.approx(2.0 * pi / sqrt(2.0), rel=1e-3)
 
 
+class TestSliding:
+    @pytest.mark.parametrize("off", [1e-13, 1e-11, 1e-9])
+    def test_what_is_left_of_a_damped_swing_is_no_oscillation(self, off):
+        """Launched beside its equilibrium the body slides steadily: errors of the run are no motion."""
+        of = scene("stiction", mu_s=0.4, mu_k=0.25, k=100.0, belt=1.0, x=0.25 * 9.81 / 100.0 + off, velocity=0.0) | {
+            "damper": {"coefficient": 1.0}
+        }
+        found = ringsweep.sweep(
+            of, {"belt.velocity": [0.5, 0.73, 1.1, 1.7], "time.span": [60.0, 300.0]}, progress=False
+        )
+        assert set(ringsweep.words(found.regime).values.flat) == {"sliding"}
+        assert set(ringsweep.words(found.long_run).values.flat) == {"steady"}
+
+
 class TestSpan:
     """Where the span ends does not matter."""
 

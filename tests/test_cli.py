@@ -487,7 +487,7 @@ def test_json_of_run_and_info_has_the_counts_and_nothing_else_on_stdout(folder, 
     found = json.loads(out)
     assert sum(found["counts"]["regime"].values()) == 5
     assert found["dimensions"] == {"drive_amplitude": 5}
-    assert main(["info", "case.nc", "--json"]) == 0
+    assert main(["info", "case.nc", "--json", "--quiet"]) == 0
     assert json.loads(capsys.readouterr().out) == found
 
 

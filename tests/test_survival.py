@@ -207,7 +207,7 @@ class TestContinuation:
             patch.setattr("ringsweep.runs.grid.compute_task", endless)
             assert cli.main(command) == 128 + number
         ended.set()
-        assert "are done (Ctrl-C again: stop now" in caplog.text
+        assert "done (Ctrl-C again: stop now" in caplog.text
         assert "interrupted" in capsys.readouterr().err
         # The other thread may not have finished its task.
         assert len(tasks_of(target)) >= 6 - int(jobs)

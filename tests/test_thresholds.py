@@ -35,6 +35,17 @@ class TestThreshold:
             ends = ringsweep.sweep(scene, {"drive.amplitude": [value - 1.001 * error, value + 1.001 * error]})
             assert (ringsweep.words(ends.regime).values == "separating").tolist() == [begins == 0, begins == 1]
 
+    def test_no_change_between_cells_of_the_sweep_is_missed(self, scene):
+        """The runs of a scan divide the intervals of the axis, however it is spaced, and its cells are among them."""
+        swept = [0.5, 0.75, 0.8, 5.0, 7.6, 7.7, 7.9, 8.0]
+        maps = ringsweep.sweep(scene, {"drive.amplitude": swept}, progress=False)
+        inside = ringsweep.words(maps.regime).values == "separating"
+        config = {"scene": scene, "sweep": {"grid": {"drive.amplitude": swept}}}
+        found = ringsweep.threshold(config, "drive.amplitude", "separating", scan=2, tolerance=1e-2)
+        between = np.searchsorted(swept, found.drive_amplitude.values) - 1
+        assert 0 < found.sizes["vertex"] == np.count_nonzero(np.diff(inside.astype(int)))
+        assert between.tolist() == np.flatnonzero(np.diff(inside.astype(int))).tolist()
+
     @pytest.mark.slow
     def test_what_follows_a_lost_contact_has_thresholds_too(self, scene, tmp_path, capsys):
         """Runs beside each threshold differ in the word of the aftermath. Without `impact` there is none."""

@@ -53,7 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.getLogger().handlers[0].setFormatter(_Formatter())
     level = logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
     logging.getLogger("ringsweep").setLevel(level)
-    out = None if arguments.quiet else _Escaped(sys.stdout)
+    # Numbers for a program are no message.
+    out = None if arguments.quiet and not getattr(arguments, "json", False) else _Escaped(sys.stdout)
     try:
         with _terminable(), _warnings_in_one_line(), redirect_stdout(out):
             status = arguments.command(arguments)

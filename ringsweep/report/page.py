@@ -87,9 +87,11 @@ def report(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         add("Which contact is lost", [first], of("separating_contact"))
         cure = ["a run ends where a contact is lost; with scene.impact, such as {restitution: 0.5}, it goes on"]
         add("What follows a lost contact", lines.get("aftermath", cure), of("aftermath"))
-    if "sobol_first" in ds:
+    # These pictures are those of one cell.
+    is_one = is_sampled(ds) and all(ds.sizes[dim] == 1 for dim in ds["probability"].dims if dim != "word")
+    if "sobol_first" in ds and is_one:
         add("What the regime depends on", [], lambda: panel(sensitivity_panel, ds))
-    if "survival" in ds:
+    if "survival" in ds and is_one:
         add("How long it holds", [], lambda: panel(survival_panel, ds))
     if "shocks" in lines:
         add("Shocks", lines["shocks"], of("jump_max"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from math import floor, log10
+from math import ceil, floor, log10
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ SCAN = 128
 # Error allowed, relative to the greatest value.
 _TOLERANCE = 1e-6
 
-# From this ratio of the ends on, the runs of a scan stand in geometric progression.
+# From this ratio of the ends on, the runs of a scan stand in geometric progression, unless an axis says how they stand.
 _WIDE = 10.0
 
 _MISSED = "two changes between neighbours among these runs would be missed"
@@ -75,7 +75,9 @@ def threshold(
     set : mapping of str to number or str, optional
         Values that replace those of the scene, by path, as for :func:`ringsweep.simulate`.
     scan : int, optional
-        Number of runs between the ends, both included; 128 by default. Two changes between two of them are missed.
+        Least number of runs between the ends, both included; 128 by default. Two changes between two of them are
+        missed. They divide the intervals between the values that the configuration sweeps. If it sweeps none, they
+        stand in geometric progression where the ends have a ratio of 10 or more, else at equal distances.
     jobs : int, optional
         Number of threads; all cores by default.
     unit : str, optional
@@ -127,7 +129,7 @@ def threshold(
     within = Parameter(si, "tolerance of a threshold", lower=0.0, open_lower=True)
     allowed = quantity(_TOLERANCE * max(abs(low), abs(high)) if tolerance is None else tolerance, within, "tolerance")
     count = SCAN if scan is None else int(quantity(scan, Parameter("1", "number of runs", lower=2, whole=True), "scan"))
-    values = (np.geomspace if low > 0.0 and high >= _WIDE * low else np.linspace)(low, high, count)
+    values = _to_scan(whole.axes.columns.get(path), low, high, count)
     if whole.sample is not None:
         found = distribution(whole, path, regime, values, allowed, jobs=jobs)
         return found.assign_attrs(threshold_unit=unit)
@@ -154,6 +156,16 @@ def threshold(
         .assign(begins=("vertex", begins, {"long_name": "whether the regime begins as the number grows"} | flags))
         .assign_attrs(threshold_path=path, threshold_unit=unit, scan=_scanned(runs, in_unit(runs[name], unit), label))
     )
+
+
+def _to_scan(swept: tuple[Any, NDArray[np.float64]] | None, low: float, high: float, count: int) -> NDArray[np.float64]:
+    """Values of the runs of a scan. Those that are swept are among them: a scan misses nothing that a map shows."""
+    if swept is None:
+        return (np.geomspace if low > 0.0 and high >= _WIDE * low else np.linspace)(low, high, count)
+    inner = swept[1][(low < swept[1]) & (swept[1] < high)]
+    known = np.unique(np.concatenate([[low, high], inner]))
+    parts = ceil((count - 1) / (len(known) - 1))
+    return np.interp(np.arange(parts * (len(known) - 1) + 1) / parts, np.arange(len(known)), known)
 
 
 def distribution(

@@ -188,6 +188,9 @@ _AT_REST = 1e-8
 # A turn counts if the body has moved farther than this share of the range of its displacement.
 _ROUNDING = 1e-6
 
+# A body slides steadily if it moves by less than this share of its displacement: errors of a run are as large.
+_UNRESOLVED = 1e-8
+
 
 @inlined
 def record_at_launch(scene, t, seen, band, play):
@@ -524,14 +527,14 @@ def _words(scene, r, t, of):
             return STICK_SLIP, TRANSIENT, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan
         if natural < inf:
             far = max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
-            steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * far
+            steady = abs(r.last.velocity) * min(natural, scene.span) <= max(RETURN * far, _UNRESOLVED * abs(r.last.x))
         else:
             steady = abs(r.last.v_rate) * scene.span <= RETURN * abs(r.last.v)
         return SLIDING, still if steady and not forced else TRANSIENT, nan, 0.0, 0.0
     long_run = PERIODIC if returns else _without_return(r.cycles.parts, scene, r)
     if stops_per_cycle > 0.0 or share > 0.0 or (in_stop and not forced):
         return STICK_SLIP, long_run, period, share, stops_per_cycle
-    if scene.place_counts > 0.0 and swing <= _ROUNDING * (r.x_max - r.x_min):
+    if scene.place_counts > 0.0 and swing <= max(_ROUNDING * (r.x_max - r.x_min), _UNRESOLVED * abs(r.last.x)):
         return SLIDING, still, nan, 0.0, 0.0
     # At a high frequency even a slow decay per cycle ends the motion within the span.
     decays = not forced and c.lap == 1.0 and abs(c.swing - c.swing_before) * c.count > _DECAY * c.swing
