@@ -56,10 +56,8 @@ class Accessor:
         found = self._ds
         for name, given in classes.items():
             known = self.words(resolve("where", name, self._ds))
-            each = given if isinstance(given, Iterable) and not isinstance(given, str) else [given]
-            found = found.where(
-                known.isin([resolve(name, str(one), meanings_of(self._ds[name]).values()) for one in each])
-            )
+            among = meanings_of(self._ds[name]).values()
+            found = found.where(known.isin([resolve(name, str(word), among) for word in np.ravel(given)]))
         return found
 
     def to_frame(self, along: str | None = None) -> pd.DataFrame:
