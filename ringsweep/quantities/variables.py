@@ -372,7 +372,9 @@ def words(data: xr.DataArray) -> xr.DataArray:
     text = np.full(data.shape, "", dtype=f"<U{max(map(len, meanings.values()))}")
     for value, meaning in meanings.items():
         text[data.values == value] = meaning
-    return data.copy(data=text).drop_attrs(deep=False)
+    found = data.copy(data=text)
+    found.attrs = {}
+    return found
 
 
 def swept(ds: xr.Dataset) -> list[xr.DataArray]:
