@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+import secrets
 import socket
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
@@ -17,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from distributed import Client, KilledWorker, as_completed
 from distributed.comm.addressing import parse_address, parse_host_port
+from distributed.diagnostics.plugin import WorkerPlugin
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -37,9 +39,27 @@ _CURE = "a limit of memory below 1 GB is too small for a worker: dask worker ADD
 # Seconds between two counts of the workers.
 _COUNT_INTERVAL = 0.5
 
+# In a worker: functions that compute tasks, by key of their sweep.
+_compute: dict[str, Callable[[Positions], Any]] = {}
 
-def _run_task(compute: Callable[[Positions], Result], task: Positions) -> Result:
-    return compute(task)
+
+class _SendCompute(WorkerPlugin):
+    """Sends the function that computes tasks to every worker once, also to workers that come later."""
+
+    def __init__(self, key: str, compute: Callable[[Positions], Any]):
+        self.name = f"ringsweep-{key}"
+        self.key = key
+        self.compute = compute
+
+    def setup(self, worker: Any) -> None:
+        _compute[self.key] = self.compute
+
+    def teardown(self, worker: Any) -> None:
+        _compute.pop(self.key, None)
+
+
+def _run_task(key: str, task: Positions) -> Any:
+    return _compute[key](task)
 
 
 @contextmanager
@@ -107,15 +127,16 @@ class Workers:
         If a worker dies, its task goes to another worker. A task that kills several workers raises
         `distributed.KilledWorker`. (joblib's Dask backend would then wait for ever, and counts the workers only once.)
         """
+        key = secrets.token_hex(8)
+        plugin = _SendCompute(key, compute)
+        self.client.register_plugin(plugin)
         try:
-            # A result that workers pass on to each other: sent with every task, it would be long.
-            shared = self.client.submit(lambda: compute, pure=False)
             futures = as_completed(loop=self.client.loop, with_results=True)
 
             def submit() -> None:
                 # Two tasks per thread, so that no thread waits for its next task.
                 for task in islice(tasks, max(0, max(2, 2 * self.concurrency()) - futures.count())):
-                    futures.add(self.client.submit(_run_task, shared, task, pure=False))
+                    futures.add(self.client.submit(_run_task, key, task, pure=False))
 
             submit()
             if not self.concurrency():
@@ -136,6 +157,9 @@ class Workers:
             if isinstance(error, OSError | CancelledError | asyncio.CancelledError) or not self.is_connected():
                 raise ConnectionError("the connection to the Dask scheduler is lost") from error
             raise
+        finally:
+            if self.is_connected():
+                _leave(lambda: self.client.unregister_worker_plugin(plugin.name))
 
     def is_connected(self) -> bool:
         """Whether the client has not lost its scheduler."""
