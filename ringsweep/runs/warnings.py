@@ -160,13 +160,18 @@ def _value(axis: xr.DataArray) -> str:
 def _hint_at_idle_axes(results: xr.Dataset) -> None:
     """Say which axes change no number of any cell."""
     columns = [results.variables[name] for name in results.data_vars if name != "steps"]
-
-    def is_idle(column: xr.Variable, dim: str) -> bool:
-        first = np.broadcast_to(column.isel({dim: [0]}).values, column.shape)
-        return np.array_equal(column.values, first, equal_nan=column.dtype.kind == "f")
-
     for dim in map(str, results["regime"].dims):
-        if "origin" in results or results.sizes[dim] < _ALONG or not all(is_idle(one, dim) for one in columns):
+        if "origin" in results or results.sizes[dim] < _ALONG or not all(_is_idle(one, dim) for one in columns):
             continue
         why = ": no contact meets an edge of the zone, or friction is alike on both sides" if "zone" in dim else ""
         logger.info("no number depends on %s%s", dim, why)
+
+
+def _is_idle(column: xr.Variable, dim: str) -> bool:
+    """Whether each value is the first one along a dimension. A file is read in chunks, up to the first that differs."""
+    for _, _, region in Layout(column.shape).chunks():
+        first = tuple(slice(1) if name == dim else part for name, part in zip(column.dims, region, strict=True))
+        values, expected = np.broadcast_arrays(column[region].values, column[first].values)
+        if not np.array_equal(values, expected, equal_nan=column.dtype.kind == "f"):
+            return False
+    return True
