@@ -30,6 +30,13 @@ from ringsweep.quantities.variables import written
 #: A value to change: ``"PATH=VALUE"`` as a user types it, or path and value as a program gives them.
 Setting = str | tuple[str, Any]
 
+# What keeps parts of a configuration from standing beside others.
+_NEEDS = {
+    "sweep.sample": "which needs runs of its own for each cell",
+    "sweep.follow": "which needs the cell before for each cell",
+    "record.section": "which needs a run for each cell",
+}
+
 _SECTIONS = "scene", "solver", "record", "sweep"
 
 
@@ -211,12 +218,13 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         check_consistency(scene, axes)
     given = tree.get("sweep", {})
     refine, follow = read_refinement(given.get("refine"), axes), read_follow(given.get("follow"), scene, axes)
-    # Cells that are inferred, and probabilities, have no points of a section.
+    # A section stands beside all but cells that are inferred, and probabilities.
     section = None if refine is None and sample is None else scene.structure.section
     parts = {"sweep.refine": refine, "sweep.sample": sample, "sweep.follow": follow, "record.section": section}
     excluding = [path for path, part in parts.items() if part is not None]
     if len(excluding) > 1:
-        raise InputError(excluding[0], f"cannot stand beside {excluding[1]}: leave one of them out")
+        problem = f"cannot stand beside {excluding[1]}, {_NEEDS[excluding[1]]}; leave one of them out"
+        raise InputError(excluding[0], problem)
     # Axes that a program gives are in SI units.
     _warn_of_units(scene, changed, columns if doc.columns is None and doc.locations else ())
     axes = with_direction(axes, follow)
