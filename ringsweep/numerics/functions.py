@@ -301,7 +301,7 @@ lanes_body(arc_tangent)(lambda x: _arc_tangent_in_lanes(x))
 
 
 @intrinsic
-def _spread_number(typingctx, x):
+def _splat(typingctx, x):
     """Lanes that all hold the same number."""
     return LANES(types.float64), lambda context, builder, sig, args: spread_scalar(builder, args[0], VECTOR)
 
@@ -311,7 +311,7 @@ def spread(x):
     return x
 
 
-_spread_number: Any = _spread_number
+_spread_number: Any = _splat
 
 
 @intrinsic
