@@ -146,4 +146,4 @@ def _thresholds(ds: xr.Dataset, configuration: dict[str, Any], occurring: list[s
                 lines.append(f"  {regime}: {error}")
             else:
                 lines += [f"  {line}" for line in in_words(found).splitlines()[:-1]]
-    return [*lines, f"{SCAN} runs between the ends of each axis; two changes between neighbours among them are missed"]
+    return [*lines, f"{SCAN} runs or more along each axis; two changes between neighbours among them are missed"]
