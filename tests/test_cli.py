@@ -501,6 +501,22 @@ def test_json_of_a_sample_has_its_probabilities_as_numbers(folder, capsys):
         assert found["probability_low"][word] <= share <= found["probability_high"][word]
 
 
+def test_info_of_one_cell_of_a_sample_has_its_probabilities_and_coordinates(folder, capsys):
+    grid = "\n  grid: {friction.rest.mu_k: [0.05, 0.1]}\n"
+    sample = "  sample: {n: 8, of: {drive.amplitude: {uniform: [0.5, 10]}}}\n"
+    (folder / "case.yaml").write_text(f"{TEXT.partition(chr(10) + 'sweep:')[0]}\nsweep:{grid}{sample}")
+    assert main(["run", "case.yaml", "--json", "--jobs", "1"]) == 0
+    whole = json.loads(capsys.readouterr().out)
+    (axis,) = whole["coordinates"].values()
+    assert axis == {"units": "1", "values": [0.05, 0.1]}
+    for k, value in enumerate(axis["values"]):
+        assert main(["info", "case.nc", "--json", "--sel", f"friction.rest.mu_k={value}"]) == 0
+        one = json.loads(capsys.readouterr().out)
+        assert one["probability"] == {word: shares[k] for word, shares in whole["probability"].items()}
+    assert main(["info", "case.nc", "--sel", "friction.rest.mu_k=0.1"]) == 0
+    assert "cells: 1\n" in capsys.readouterr().out
+
+
 def test_simulate_takes_a_cell_of_a_file(folder, capsys):
     assert main(["run", "case.yaml", "--jobs", "1"]) == 0
     assert main(["simulate", "case.nc", "--sel", "drive.amplitude=1", "--set", "time.span=1"]) == 0

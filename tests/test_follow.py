@@ -288,6 +288,7 @@ class TestFilesThatDoNotGoOn:
         path = tmp_path / "loop.yaml"
         path.write_text(json.dumps({"scene": changed(LUGRE, "initial", **{"from": "loop.yaml"})}))
         self.refused(path, "is no result file")
+        self.refused(tmp_path / "absent.nc", "does not exist")
 
     def test_results_that_name_each_other(self, file, tmp_path):
         for one, other in (("a.nc", "b.nc"), ("b.nc", "a.nc")):

@@ -314,6 +314,7 @@ def info_command(arguments: argparse.Namespace) -> None:
     """Print a summary of a result file.
 
     ringsweep info my.nc
+    ringsweep info uncertain.nc --sel drive.amplitude=2     probabilities of one cell
     """
     from ringsweep.storage import netcdf
 
@@ -326,8 +327,11 @@ def info_command(arguments: argparse.Namespace) -> None:
 
             print(references(load(arguments.dataset), result.attrs["ringsweep_version"]))
             return
+        from ringsweep.cli.drawing import selection_of
+        from ringsweep.plots.selection import select
         from ringsweep.report.text import about, as_json
 
+        result, _ = select(result, dict(map(selection_of, arguments.sel)))
         print(as_json(result) if arguments.json else about(result))
     if sealed and not arguments.json:
         print("seal: the file is what ringsweep wrote")

@@ -13,6 +13,7 @@ from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_sampled, resolve
 from ringsweep.plots.look import panel
 from ringsweep.plots.maps import Map, suitable
+from ringsweep.plots.saving import SUFFIXES, suffix_of
 from ringsweep.plots.sections import points_of
 from ringsweep.plots.selection import select, select_grid
 from ringsweep.storage import files, netcdf
@@ -47,7 +48,7 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     shown = None if arguments.var == "regime" else arguments.var
     bounded = None if arguments.boundaries is None else _name_part(arguments.boundaries)
     target = _picture_of(dataset, arguments.output, shown, *map(_name_part, arguments.sel), bounded)
-    page = target.suffix.lower() == ".html"
+    page = suffix_of(target, (*SUFFIXES, ".html"), "maps") == ".html"
     for option, given in (("--log", arguments.log), ("--boundaries", arguments.boundaries)):
         if page and given:
             raise InputError(option, "is for pictures, not for a page: name the output *.png")

@@ -113,6 +113,7 @@ def build_parser() -> argparse.ArgumentParser:
     _option(precision, "--rounds N", "timings of each setting (default: 3)", type=_COUNT, default=argparse.SUPPRESS)
 
     info = _add_command(entries, commands.info_command, "dataset OUT.nc")
+    _option(info, "--sel DIM=VALUE", "only the cells whose coordinate is nearest to VALUE; units allowed", **_LIST)
     _option(info, *_JSON)
     _option(info, "--cite", "print only what a paper that uses it can cite")
 

@@ -42,7 +42,8 @@ def run_to_continue(doc: Document) -> str | None:
         raise InputError(f"scene.initial.{key}", _BESIDE)
     # A configuration could name another file in turn, without end. A result holds the values.
     if not is_result(file := doc.folder / name):
-        raise InputError(FROM, f"{file} is no result file: `ringsweep run` or `simulate` writes one")
+        problem = "is no result file" if file.exists() else "does not exist"
+        raise InputError(FROM, f"{file} {problem}: `ringsweep run` or `simulate` writes one")
     return str(file)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from contextlib import suppress
 from itertools import chain
 from typing import Any
@@ -52,7 +51,8 @@ def about(result: xr.Dataset) -> str:
             with suppress(InputError):
                 axis = in_unit(axis, written_unit(configuration, axis.attrs.get("path", "")))
             unit = after_number(axis.attrs.get("units", "1"))
-            lines.append(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{unit}")
+            low, high = axis.values.min(), axis.values.max()
+            lines.append(f"  {name}: {low:g}{f' to {high:g}' * bool(high > low)}{unit}")
     if not {"contender", "time"} & set(result.dims):
         lines.append(f"variables: {', '.join(map(str, result.data_vars))}")
     lines += [in_lines(result), f"solver: {json.dumps(configuration.get('solver', result.attrs.get('method')))}"]
@@ -72,11 +72,26 @@ def as_json(result: xr.Dataset) -> str:
     else:
         flagged = [str(name) for name, data in result.data_vars.items() if is_classification(data)]
         found["counts"] = {name: {word: count for _, word, count in _counts(result, name)} for name in flagged}
-        for name in (str(name) for name in result.data_vars if str(name).startswith("probability")):
-            # In the shape of the grid: of one cell a number.
-            found[name] = {word: result[name].sel(word=word).values.tolist() for word in result["word"].values.tolist()}
+        if "probability" in result:
+            found |= _statistics(result)
     # JSON has no infinity.
-    return re.sub(r"(?<=: )-?Infinity|(?<=: )NaN", "null", json.dumps(found, indent=2, ensure_ascii=False))
+    found = json.loads(json.dumps(found), parse_constant=lambda _: None)
+    return json.dumps(found, indent=2, ensure_ascii=False)
+
+
+def _statistics(result: xr.Dataset) -> dict[str, Any]:
+    """What a sampled sweep says of each cell, in the shape of the grid, by word where it has words; the coordinates."""
+    statistics = result.drop_vars("runs").drop_dims(("sample", "replicate"), errors="ignore")
+    found: dict[str, Any] = {
+        str(name): {word: data.sel(word=word).values.tolist() for word in data["word"].values.tolist()}
+        if "word" in data.dims
+        else data.values.tolist()
+        for name, data in statistics.data_vars.items()
+    }
+    axes = statistics.drop_vars("word").coords.items()
+    return found | {
+        "coordinates": {name: {"units": c.attrs.get("units"), "values": c.values.tolist()} for name, c in axes}
+    }
 
 
 def summary(result: xr.Dataset) -> dict[str, list[str]]:
