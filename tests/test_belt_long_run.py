@@ -143,6 +143,15 @@ def test_stops_of_a_settled_motion_are_those_of_longer_spans(ratio, friction):
     np.testing.assert_allclose(found.stick_share.values[settled], found.stick_share.values[-1], rtol=0.01)
 
 
+@pytest.mark.parametrize("amplitude", [0.303, 0.306, 0.33])
+def test_swing_of_short_slips_between_stops_is_their_length(amplitude):
+    """Each half of the period the body slips, in one step of the solver, from -x to x, and rests there."""
+    found = over(scene("coulomb", 0.9, amplitude, x=0.5, v_belt=0.0, mu_k=0.3), 0.9, [200.0, 400.0])
+    assert found.settled.values.tolist() == [1, 1]
+    np.testing.assert_allclose(found.period, 2.0 * pi / 0.9, rtol=1e-9)
+    np.testing.assert_allclose(found.swing, 2.0 * abs(found.x_end), rtol=1e-6)
+
+
 def test_period_of_three_cycles_that_becomes_one_is_not_settled():
     found = hartog(1.4967889908256882, 0.05, [800.0, 8000.0])
     assert found.settled.values.tolist() == [0, 1]
