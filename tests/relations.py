@@ -152,6 +152,7 @@ MAGNITUDES: dict[str, tuple[float, float]] = {
     r"belt.velocity": (0.01, 1.0),
     r"belt drive.frequency|belt force.frequency": (0.1, 2.0),
     r"force.(amplitude|constant)": (0.2, 8.0),
+    r"belt.incline": (0.01, 1.0),
     r"initial.x|initial.velocity": (0.05, 1.0),
     r"initial.deflection": (1e-7, 1e-6),
     r"ring\S* body.mass": (0.02, 0.5),
@@ -283,7 +284,7 @@ def _with_tables(run: Run, change: Callable[[str, np.ndarray], np.ndarray]) -> d
 #: Numbers of a scene that may be negative, by the end of their paths: -1 if they change their sign in a mirror image.
 #: A center_offset lies along the line of symmetry.
 PARITY = {
-    r"belt.velocity|initial.(x|velocity|deflection|phi|omega)": -1,
+    r"belt.(velocity|incline)|initial.(x|velocity|deflection|phi|omega)": -1,
     r"center|(drive|force).(amplitude|constant)": -1,
     r"body.normal_stiffness": -1,
     r"spring.cubic|phase|body.center_offset|shift|frequency": 1,

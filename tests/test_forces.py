@@ -181,6 +181,41 @@ class TestStick:
         assert float(run.velocity[slips]) == pytest.approx(0.05, rel=1e-10)
 
 
+def inclined(angle, **parts):
+    """A scene on a belt that rises towards growing x by this angle."""
+    scene = forced(**parts)
+    return scene | {"belt": scene["belt"] | {"incline": angle}}
+
+
+class TestIncline:
+    """Gravity pulls a body down the belt, and presses it less."""
+
+    def test_angle_at_which_a_block_slides_has_the_tangent_mu_s(self):
+        block = inclined("0 deg", friction=0.3, load=0.2, k=0.0)
+        found = ringsweep.threshold(block, "belt.incline", "riding", ("0 deg", "45 deg"), 1e-9, scan=5)
+        assert abs(found.belt_incline.item() - np.arctan(0.5)) <= found.error.item() <= 1e-9
+
+    def test_block_slides_down_as_galilei_says(self):
+        steep = np.radians([-89.9, -30.0, 30.0, 89.9])
+        block = inclined("0 deg", friction=0.3, load=0.2, k=0.0, span=2.0)
+        found = ringsweep.sweep(block, {"belt.incline": steep}, progress=False)
+        expected = -2.0 * np.sign(steep) * (abs(np.sin(steep)) - 0.3 * np.cos(steep))
+        np.testing.assert_allclose(found.x_end, expected, rtol=1e-10)
+        assert (found.certified == 1).all()
+
+    @pytest.mark.parametrize("v_b", [-2.0, 2.0])
+    def test_spring_balances_gravity_and_friction_in_the_end(self, v_b):
+        angle = np.radians(20.0)
+        x, velocity = end(inclined("20 deg", friction=0.1, c=1.0, v_b=v_b, span=60.0))
+        assert x == pytest.approx(0.1 * np.sign(v_b) * np.cos(angle) - np.sin(angle), rel=1e-9)
+        assert velocity == pytest.approx(0.0, abs=1e-9)
+
+    @pytest.mark.parametrize("angle", ["90 deg", "-90 deg", "2 rad"])
+    def test_belt_that_is_upright_or_overhangs_is_refused(self, angle):
+        with pytest.raises(InputError, match=r"belt\.incline.*greater than -1\.5708 and less than 1\.5708"):
+            ringsweep.simulate(inclined(angle))
+
+
 class TestPublished:
     """Numbers that others published."""
 

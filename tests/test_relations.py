@@ -15,19 +15,22 @@ import ringsweep
 
 #: Kinds of scenes by name. The first ones take kernels that other tests take too.
 SPRING = ("spring.cubic", "damper.coefficient")
+SLOPE = ("belt.incline",)
 LOADS = ("friction.viscous", "body.normal_stiffness", "force.constant")
 IN_STEP = {"drive.frequency": 0.5, "force.frequency": 1.0}
 BROAD = {"friction.alpha": 10.0, "friction.v0": 0.2}
 STEPS = {"method": "rk4", "steps": 4000}
 KINDS = {
     "belt": Kind("belt", "stiction", force="harmonic", parts=SPRING, span=(2, 20)),
-    "belt-lugre": Kind("belt", "lugre", force="harmonic", parts=SPRING, span=(1, 8)),
+    "belt-lugre": Kind("belt", "lugre", force="harmonic", parts=SPRING + SLOPE, span=(1, 8)),
     "ring": Kind("ring", "stiction", "arctan", arcs=1),
     "ring-smooth": Kind("ring", "bengisu-akay", "arctan", arcs=1),
     "ring-impact": Kind("ring", "stiction", "arctan", arcs=1, impact=True),
     "ring-rk4": Kind("ring", "bengisu-akay", "arctan", arcs=1, solver=STEPS, fixed=BROAD),
     "ring-dahl": Kind("ring", "dahl", "arctan", arcs=1),
-    "belt-all": Kind("belt", "tustin", "sinusoidal", 0, "harmonic", SPRING + LOADS, span=(2, 20), fixed=IN_STEP),
+    "belt-all": Kind(
+        "belt", "tustin", "sinusoidal", 0, "harmonic", SPRING + LOADS + SLOPE, span=(2, 20), fixed=IN_STEP
+    ),
     "belt-load": Kind("belt", "stiction", "constant", force="constant", parts=LOADS[1:], span=(2, 40)),
     "belt-no-spring": Kind("belt", "coulomb", "sinusoidal", span=(2, 20), fixed={"spring.stiffness": 0.0}),
     "belt-section": Kind("belt", "hyperbolic", force="harmonic", span=(20, 60), record={"section": {"at": "period"}}),

@@ -32,6 +32,16 @@ SECTION = "x_section", "velocity_section", "deflection_section"
 # Relative error of a deflection at the loosest tolerance.
 _LOOSEST = 1e-3
 
+_INCLINE = Parameter(
+    "rad",
+    "angle by which the belt rises towards growing x (default: 0)",
+    lower=-np.pi / 2.0,
+    upper=np.pi / 2.0,
+    open_lower=True,
+    open_upper=True,
+    optional=True,
+)
+
 # Optional fields of the body, by path.
 _OPTIONAL = {
     "cubic": "spring.cubic",
@@ -74,7 +84,7 @@ class Belt(Model, Continues):
         """
         found = {"initial.x": ended["x_end"], "initial.velocity": ended["velocity_end"]}
         if "initial.deflection" in values:
-            most = _largest_deflection(structure, values)
+            most = _largest_deflection(structure, _on_incline(values))
             found["initial.deflection"] = np.clip(ended["deflection_end"], -most, most)
         return found | phases(("force", "drive"), values, ended)
 
@@ -109,6 +119,7 @@ class Belt(Model, Continues):
                 "N s/m", "coefficient of the damper to the wall (default: 0)", lower=0.0, optional=True
             ),
             "belt.velocity": Parameter("m/s", "velocity of the belt", optional=True),
+            "belt.incline": _INCLINE,
         }
         found |= {f"friction.{name}": p for name, p in friction.coefficients_of(law).items()}
         for name, p in declared(law).items():
@@ -149,6 +160,7 @@ class Belt(Model, Continues):
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
         if structure.arcs:
             raise InputError(f"scene.{structure.arcs[0]}", "a belt has no zones")
+        values = _on_incline(values)
         law = structure.law_type
         mu_s, mu_k = friction_coefficients(structure, "friction", values)
         drive = self._drive(structure, values)
@@ -252,6 +264,15 @@ class Belt(Model, Continues):
         else:
             return drive
         return forces.Forced(drive, force, constant, abs(constant) + largest)
+
+
+def _on_incline(values: Values) -> Values:
+    """Values of a level belt on which the body moves alike: gravity presses it less, and pulls it along the belt."""
+    if "belt.incline" not in values:
+        return values
+    gravity, incline = values["gravity"], values["belt.incline"]
+    force = values.get("force.constant", 0.0) - values["body.mass"] * gravity * np.sin(incline)
+    return {**values, "gravity": gravity * np.cos(incline), "force.constant": force}
 
 
 # Cycles in a span if neither the forcing nor a spring has a period.
