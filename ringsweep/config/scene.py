@@ -13,7 +13,7 @@ from typing import Any
 
 from ringsweep.config import own
 from ringsweep.config.options import read_record
-from ringsweep.config.sections import choose, missing_text, section_of, suggestion, warn_once
+from ringsweep.config.sections import choose, missing_text, one_of, section_of, suggestion, warn_once
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
@@ -23,6 +23,9 @@ from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.formula import NAMES
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, quantity, show
+
+#: Values of ``initial.steady``.
+STEADY = {"slip": "the body rests in space, where spring, friction and constant forces balance"}
 
 # Ratio of lengths of one scene above which a unit may be wrong: 1 m in place of 1 mm.
 _LARGEST_RATIO = 1000.0
@@ -145,7 +148,21 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
         drive = choose(names, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
     impact = model in WITH_IMPACT and ("impact" in scene or any(str(path).startswith("impact.") for path in swept))
     found = Structure(model, "", drive, own_drive=own.drive_type(model, scene.get("drive", {})), impact=impact)
-    return replace(found, own_force=own.force_type(scene.get("force"))) if _takes_force(model) else found
+    if not _takes_force(model):
+        return found
+    return replace(found, own_force=own.force_type(scene.get("force")), steady=_starts_steadily(scene, swept))
+
+
+def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
+    """Whether the body is launched at steady slip, which leaves nothing of its state to choose."""
+    initial = scene.get("initial")
+    if not isinstance(initial, Mapping) or "steady" not in initial:
+        return False
+    one_of(initial["steady"], STEADY, "scene.initial.steady", "is no steady motion")
+    for name in ("x", "velocity", "deflection"):
+        if name in initial or f"initial.{name}" in swept:
+            raise InputError(f"scene.initial.{name}", "cannot stand beside initial.steady, which gives it")
+    return True
 
 
 def _takes_force(model: str) -> bool:
@@ -225,7 +242,7 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
     yield from ("model", LAW, "drive.law", "friction.laws")
     takes_force = _takes_force(model)
     by_formula = {"friction.mu": own.FORMULA in laws, "friction.at_rest": own.FORMULA in laws}
-    by_formula |= {"drive.theta": drive == own.FORMULA, "force.formula": takes_force}
+    by_formula |= {"drive.theta": drive == own.FORMULA, "force.formula": takes_force, "initial.steady": takes_force}
     yield from (path for path, is_used in by_formula.items() if is_used)
     by_table = {"drive": drive == "table", "force": takes_force, "friction": own.TABLE_LAW in laws}
     yield from (f"{of}.{key}" for of, keys in own.TABLE_KEYS.items() if by_table[of] for key in keys)

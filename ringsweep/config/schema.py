@@ -10,7 +10,7 @@ from itertools import product
 from typing import Any
 
 from ringsweep.config import axes, neighbours, options, own, uncertain
-from ringsweep.config.scene import structures_of
+from ringsweep.config.scene import STEADY, structures_of
 from ringsweep.config.sections import Keys
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import ELSEWHERE, LAW
@@ -52,6 +52,7 @@ def schema() -> dict[str, Any]:
             "friction.at_rest": by_formula["at_rest"],
             "drive.law": _word("how the ring is driven", drives),
             "initial.from": _text("result file of the run on the belt that goes on"),
+            "initial.steady": _word("a motion to start from, in place of x and velocity", STEADY),
             "force.formula": _text("force on the body, N, as a formula of the time t, s"),
             **tables,
             **{f"{of}.interpolate": _word("what joins the rows", joins) for of, joins in own.INTERPOLATIONS.items()},

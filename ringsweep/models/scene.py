@@ -68,6 +68,8 @@ class Structure:
         Types of the drive and of the force on the body if the configuration defines them by formulas.
     impact : bool
         Whether a run goes on after a contact is lost.
+    steady : bool
+        Whether the body is launched at steady slip, see :mod:`ringsweep.models.belt.model`.
     exponent : bool
         Whether the record of a run holds its exponent and multipliers.
     section : Section, optional
@@ -87,6 +89,7 @@ class Structure:
     own_drive: type | None = None
     own_force: type | None = None
     impact: bool = False
+    steady: bool = False
     exponent: bool = False
     section: Section | None = None
     elsewhere: str = "rest"

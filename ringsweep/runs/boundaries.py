@@ -20,7 +20,7 @@ from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import WITH_IMPACT, model_of
 from ringsweep.models.scene import Scene
-from ringsweep.quantities.flags import AFTERMATHS, REGIMES
+from ringsweep.quantities.flags import AFTERMATHS, LONG_RUNS, REGIMES
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import INFERRED, configuration_of, meanings_of, swept
@@ -209,7 +209,7 @@ def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int 
 
 
 def word_in(ds: xr.Dataset, word: str) -> tuple[str, int]:
-    """Classification that has a word, `regime` or `aftermath`, and the flag of the word.
+    """Classification that has a word, `regime`, `aftermath` or `long_run`, and the flag of the word.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def word_in(ds: xr.Dataset, word: str) -> tuple[str, int]:
         If the dataset has no such word.
     """
     known: list[str] = []
-    for name in ("regime", "aftermath"):
+    for name in ("regime", "aftermath", "long_run"):
         if name in ds:
             flags = {meaning: flag for flag, meaning in meanings_of(ds[name]).items()}
             if word in flags:
@@ -239,10 +239,12 @@ def check_word(word: object, scene: Scene, varied: Collection[str] = ()) -> None
     Raises
     ------
     InputError
-        If it is no word of a regime or of an aftermath, or none of this scene.
+        If it is no word of a regime, of an aftermath or of a long run, or none of this scene.
     """
     model = scene.structure.model
     known = model_of(scene.structure).regimes({*varied, *scene.values})
+    if "long_run" in model_of(scene.structure).columns(scene.structure) and word in LONG_RUNS:
+        return
     if word not in REGIMES + AFTERMATHS:
         words = known + AFTERMATHS if scene.structure.impact else known
         raise InputError("regime", f"{show(word)} is not a regime" + suggestion(word, words))

@@ -25,7 +25,7 @@ from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import StepControl, implicit_step, start_at, start_control
 from ringsweep.solvers.steps import Step, either, scratch_for, without_counts
 from ringsweep.solvers.taylor import series_step
-from ringsweep.solvers.variation import at_event
+from ringsweep.solvers.variation import at_event, within_turn
 
 # A run ends after this many consecutive steps and events at one instant.
 _MOST_STALLED = 400
@@ -385,7 +385,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                 t_judged = t
             t_before = t
             n += 1
-            limit = min(scene.span, drives.next_knot(scene.drive, t))
+            limit = within_turn(variation.asked(scene), t, min(scene.span, drives.next_knot(scene.drive, t)))
             h_max = _until(limit, now)
             control = _with_length(control, min(control.h, spacing))
             run = Run(record, mode, now, y, control, local, just_switched)

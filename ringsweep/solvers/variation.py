@@ -17,6 +17,16 @@ from ringsweep.solvers import rosenbrock
 # steeply, a step holds many, and collocation follows decay of any rate, but not growth.
 _MOST_GROWTH = 1.0
 
+# Longest step, in units of the time in which the spring turns a disturbance by a radian: a body that rests would be
+# integrated in a few steps, of which collocation follows no oscillation.
+_LONGEST = 2.0
+
+
+@feature("limit", absorb=True)
+def within_turn(asked, t, limit):
+    """Time up to which a step that begins at the time `t` may reach, at most `limit`, s."""
+    return min(limit, t + _LONGEST / asked.frequency)
+
 
 @feature("record")
 def enter_series(asked, scene, record, mode, c):

@@ -37,9 +37,13 @@ _FALL_FACTOR = 5.0
 
 @audit.least_scales.implements(Belt, BristleBelt)
 def _least_scales_on_belt(batch):
-    """Implement :func:`audit.least_scales`: of times, s, that of a swing on the spring."""
+    """Implement :func:`audit.least_scales`: of times, s, that of a swing on the spring; of velocities that of a launch.
+
+    A body that is launched at rest on the spot slides on its belt.
+    """
     with np.errstate(divide="ignore", over="ignore"):
-        return {"s": np.minimum(np.sqrt(batch.body.mass / np.abs(batch.body.stiffness)), batch.span)}
+        swing = np.sqrt(batch.body.mass / np.abs(batch.body.stiffness))
+    return {"s": np.minimum(swing, batch.span), "m s-1": np.abs(batch.initial_v)}
 
 
 @audit.violation.implements(Belt)

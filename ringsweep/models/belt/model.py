@@ -23,6 +23,8 @@ from ringsweep.models.model import Continues, Model, period_of, phases
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, forces, friction, ring
+from ringsweep.physics.friction.presliding import bristle, steady_deflection
+from ringsweep.physics.friction.velocity import KINETIC, friction_at
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.variables import Variable
 
@@ -88,6 +90,10 @@ class Belt(Model, Continues):
             found["initial.deflection"] = np.clip(ended["deflection_end"], -most, most)
         return found | phases(("force", "drive"), values, ended)
 
+    def obstacle(self, structure: Structure) -> str | None:
+        """Why runs of this structure cannot go on: steady slip is a start of its own."""
+        return "cannot stand beside initial.steady, which gives the start: leave one out" if structure.steady else None
+
     def forcing_period(self, structure: Structure, values: Values) -> NDArray[np.float64]:
         """Period of drive and force, s; infinite if there is none."""
         return np.asarray(self.build(structure, values).forcing_period)
@@ -139,14 +145,18 @@ class Belt(Model, Continues):
             found["force.phase"] = forces.PHASE
         else:
             found["force.amplitude"] = forces.FACTOR
-        return found | {
+        return found | self._launch(structure) | {"time.span": SPAN, "gravity": GRAVITY}
+
+    def _launch(self, structure: Structure) -> dict[str, Parameter]:
+        """Numbers of the state at the launch: none at steady slip."""
+        if structure.steady:
+            return {}
+        return {
             "initial.x": Parameter("m", "displacement of the body at the start", default=0.0),
             "initial.velocity": Parameter(
                 "m/s", "velocity of the body at the start (default: that of the belt)", optional=True
             ),
             **self._deflection(structure),
-            "time.span": SPAN,
-            "gravity": GRAVITY,
         }
 
     def _deflection(self, structure: Structure) -> dict[str, Parameter]:
@@ -178,7 +188,7 @@ class Belt(Model, Continues):
             "mu_s": mu_s,
             "mu_k": mu_k,
             "drive": forced,
-            "initial_x": values["initial.x"],
+            "initial_x": values.get("initial.x", np.zeros(len(mass))),
             "initial_v": sliding,
             "span": values["time.span"],
         }
@@ -205,7 +215,8 @@ class Belt(Model, Continues):
                     viscous,
                     "{} N s/m is too large: friction at the edge of the dead band exceeds friction within it",
                 )
-            return belt.Belt(**fields, law=law_of(structure, values, [(mu_s, mu_k)], speed))
+            scene = belt.Belt(**fields, law=law_of(structure, values, [(mu_s, mu_k)], speed))
+            return _at_steady_slip(structure, values, scene) if structure.steady else scene
         require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with bristles needs a load")
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
@@ -221,7 +232,8 @@ class Belt(Model, Continues):
             # A run may end beyond the limit by its error.
             deflection = np.clip(deflection, -most, most)
         fields["initial_z"] = deflection
-        return belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, [(mu_s, mu_k)], speed))
+        scene = belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, [(mu_s, mu_k)], speed))
+        return _at_steady_slip(structure, values, scene) if structure.steady else scene
 
     def _drive(self, structure: Structure, values: Values) -> Any:
         """Drive of the belt, from ``belt.velocity`` or from ``drive``."""
@@ -273,6 +285,49 @@ def _on_incline(values: Values) -> Values:
     gravity, incline = values["gravity"], values["belt.incline"]
     force = values.get("force.constant", 0.0) - values["body.mass"] * gravity * np.sin(incline)
     return {**values, "gravity": gravity * np.cos(incline), "force.constant": force}
+
+
+def _at_steady_slip(structure: Structure, values: Values, scene: Any) -> Any:
+    """Cells whose body rests in space, where friction balances the spring and the forces that do not vary."""
+    where, law = "initial.steady", structure.law_type
+    velocity = values.get("belt.velocity", values.get("drive.amplitude"))
+    if structure.drive not in ("none", "constant") or velocity is None:
+        raise InputError(f"scene.{where}", "needs a belt of constant velocity: give belt.velocity")
+    bristles = friction.family_of(law) is friction.Dynamic
+    if bristles and (friction.TRAITS[law].snaps or steady_deflection.body_of(law) is None):
+        raise InputError(f"scene.{where}", f"bristles of friction law {structure.law} have no steady deflection")
+    least = values.get("friction.dead_band", 0.0)
+    require(abs(velocity) > least, where, velocity, "a belt at {} m/s does not slide along under a body at rest")
+    found = np.array([_steady_friction(take(scene, i), -v) for i, v in enumerate(velocity)])
+    K, deflection = -found.T
+    body, growth = scene.body, values.get("body.normal_stiffness", 0.0)
+    pull = K * body.mass * body.gravity + scene.viscous * velocity + values.get("force.constant", 0.0)
+    x = _nearest_balance(pull, body.stiffness - K * growth, values.get("spring.cubic", np.zeros(len(K))))
+    require(np.isfinite(x), where, pull, "there is none: the spring cannot hold the body against {} N")
+    load = body.mass * body.gravity + growth * x
+    require(load > 0.0, where, load, "there is none: the normal load would be {} N")
+    return scene._replace(initial_x=x, initial_v=-velocity, **({"initial_z": -deflection} if bristles else {}))
+
+
+def _steady_friction(scene: Any, v: float) -> tuple[float, float]:
+    """Friction per load, 1, and deflection of bristles, m, in steady sliding at the velocity `v`, m/s."""
+    law, surface, sign = scene.law, (scene.mu_s, scene.mu_k), np.copysign(1.0, v)
+    if not isinstance(scene, belt.BristleBelt):
+        return sign * friction_at(law, abs(v), surface)[0], 0.0
+    z = steady_deflection(law, *surface, v)
+    return bristle(law, *surface, v, z, sign, KINETIC)[3], z
+
+
+def _nearest_balance(
+    pull: NDArray[np.float64], stiffness: NDArray[np.float64], cubic: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Displacement nearest to 0 at which springs balance a pull, and bring the body back to it, m; NaN if none does."""
+    x = np.full(len(pull), np.nan)
+    for i, (p, k, k_3) in enumerate(zip(pull, stiffness, cubic, strict=True)):
+        roots = np.roots([k_3, 0.0, k, -p])
+        held = [root.real for root in roots if root.imag == 0.0 and k + 3.0 * k_3 * root.real**2 > 0.0]
+        x[i] = min(held, key=abs, default=np.nan)
+    return x - (stiffness * x + cubic * x**3 - pull) / (stiffness + 3.0 * cubic * x**2)
 
 
 # Cycles in a span if neither the forcing nor a spring has a period.

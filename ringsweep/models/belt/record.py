@@ -511,11 +511,13 @@ def _words(scene, r, t, of):
     # A stuck body that moves goes with its belt.
     moves = forced and swing > max(r.play, r.band * scene.cycle)
     held = REST if not moves else PERIODIC if repeats else _without_return(r.cycles.parts, scene, r)
-    still = STEADY if belt_velocity != 0.0 else REST
+    growth, error = tangent.exponent(r.tangent)
+    # A small disturbance of an unstable equilibrium grows: the body does not stay there.
+    still = TRANSIENT if growth > cycles.POSITIVE * error else STEADY if belt_velocity != 0.0 else REST
     rests = max(abs(r.last.velocity), abs(r.last.v_rate) * _pace(scene)) <= RETURN * abs(belt_velocity)
     if not forced and in_stop and rests and belt_velocity != 0.0:
         # The belt slides along under a body at rest, below the speed at which its friction no longer grows.
-        return SLIDING, STEADY, nan, 0.0, 0.0
+        return SLIDING, still, nan, 0.0, 0.0
     if in_stop and (for_good or stops.least < 0.0):
         motion = RIDING if stops.least < 0.0 else STICKING
         return motion, held if for_good else TRANSIENT, c.period if for_good and repeats else nan, 1.0, 0.0
