@@ -53,6 +53,8 @@ class Kind:
         Least and greatest span, s.
     fixed : mapping of str to float
         Numbers that all cells share, by path.
+    two_way : tuple of str
+        Paths of the friction coefficients that depend on the direction of sliding.
     """
 
     model: str
@@ -66,6 +68,7 @@ class Kind:
     record: Any = None
     span: tuple[float, float] = (0.2, 3.0)
     fixed: Mapping[str, float] = field(default_factory=dict)
+    two_way: tuple[str, ...] = ()
 
     @property
     def scene(self) -> dict[str, Any]:
@@ -99,6 +102,7 @@ class Kind:
             own_drive=drive_type(self.model, scene.get("drive", {})),
             own_force=force_type(scene.get("force")),
             force=(_TIMES, _COURSE) if self.force == "table" else None,
+            two_way=self.two_way,
         )
         of_force = {"harmonic": ("amplitude", "frequency", "phase"), "constant": ("constant",)}.get(self.force, ())
         given = {*self.parts, *(f"force.{name}" for name in of_force)}
@@ -164,7 +168,7 @@ MAGNITUDES: dict[str, tuple[float, float]] = {
     r"initial.omega": (0.1, 60.0),
     r"drive.amplitude": (0.1, 20.0),
     r"ring.radius": (0.03, 0.2),
-    r"mu_[sk]": (0.02, 0.5),
+    r"mu_[sk](.\w+)?": (0.02, 0.5),
     r"alpha": (1.0, 1e4),
     r"delta": (0.1, 100.0),
     r"k_t": (1.0, 1e4),
@@ -212,8 +216,8 @@ def random_scenes(kind: Kind, count: int, rng: np.random.Generator) -> Run:
         numbers[path] = column
     # What one number of a scene asks of another.
     for path in numbers:
-        if path.endswith("mu_s"):
-            numbers[path] = numbers[path[:-1] + "k"] + rng.choice([0.0, 1.0, 1.0], count) * numbers[path]
+        if "mu_s" in path:
+            numbers[path] = numbers[path.replace("mu_s", "mu_k")] + rng.choice([0.0, 1.0, 1.0], count) * numbers[path]
     if "friction.v1" in numbers:
         numbers["friction.v1"] += numbers["friction.v0"]
     if kind.model == "ring":
@@ -307,8 +311,13 @@ def parity(path: str, parameter: Parameter) -> int:
 
 
 def mirrored(run: Run) -> Run:
-    """The mirror image of cells."""
+    """The mirror image of cells: forwards and backwards are exchanged."""
     numbers = {path: parity(path, p) * run.numbers[path] for path, p in run.kind.parameters.items()}
+    for path in run.kind.two_way:
+        numbers[f"{path}.forward"], numbers[f"{path}.backward"] = (
+            numbers[f"{path}.backward"],
+            numbers[f"{path}.forward"],
+        )
     return Run(run.kind, numbers, run.scene)
 
 

@@ -19,6 +19,7 @@ SLOPE = ("belt.incline",)
 LOADS = ("friction.viscous", "body.normal_stiffness", "force.constant")
 IN_STEP = {"drive.frequency": 0.5, "force.frequency": 1.0}
 BROAD = {"friction.alpha": 10.0, "friction.v0": 0.2}
+BOTH = ("friction.mu_s", "friction.mu_k")
 STEPS = {"method": "rk4", "steps": 4000}
 KINDS = {
     "belt": Kind("belt", "stiction", force="harmonic", parts=SPRING, span=(2, 20)),
@@ -56,6 +57,9 @@ KINDS = {
     "belt-power": Kind("belt", "stiction", "power", force="constant", span=(2, 20)),
     "belt-exponent": Kind("belt", "stiction", force="harmonic", span=(2, 20), record={"exponent": True}),
     "belt-torus": Kind("belt", "tustin", force="two-tones", span=(50, 100), record={"exponent": True}),
+    "belt-two-way": Kind(
+        "belt", "stiction", force="harmonic", parts=LOADS, span=(2, 20), two_way=BOTH, record={"exponent": True}
+    ),
     "ring-exponent": Kind("ring", "hyperbolic", "sinusoidal", arcs=1, record={"exponent": True}),
 }
 

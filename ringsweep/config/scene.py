@@ -17,10 +17,10 @@ from ringsweep.config.sections import choose, missing_text, one_of, section_of, 
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
-from ringsweep.models.scene import ELSEWHERE, LAW, Scene, Structure
+from ringsweep.models.scene import ELSEWHERE, LAW, WAYS, Scene, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
-from ringsweep.physics.friction.formula import NAMES
+from ringsweep.physics.friction.formula import COEFFICIENTS, NAMES
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, quantity, show
 
@@ -150,7 +150,12 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
     found = Structure(model, "", drive, own_drive=own.drive_type(model, scene.get("drive", {})), impact=impact)
     if not _takes_force(model):
         return found
-    return replace(found, own_force=own.force_type(scene.get("force")), steady=_starts_steadily(scene, swept))
+    return replace(
+        found,
+        own_force=own.force_type(scene.get("force")),
+        steady=_starts_steadily(scene, swept),
+        two_way=_two_way(scene, swept),
+    )
 
 
 def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
@@ -163,6 +168,14 @@ def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
         if name in initial or f"initial.{name}" in swept:
             raise InputError(f"scene.initial.{name}", "cannot stand beside initial.steady, which gives it")
     return True
+
+
+def _two_way(scene: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
+    """Paths of the friction coefficients that the scene or the sweep gives for both directions of sliding."""
+    given = friction if isinstance(friction := scene.get("friction"), dict) else {}
+    split = {f"friction.{name}" for name, value in given.items() if isinstance(value, dict)}
+    split |= {path.rpartition(".")[0] for path in map(str, swept) if path.endswith(tuple(f".{way}" for way in WAYS))}
+    return tuple(path for name in (*COEFFICIENTS, "scale") if (path := f"friction.{name}") in split)
 
 
 def _takes_force(model: str) -> bool:
@@ -285,7 +298,8 @@ class _Keys:
         drives: Collection[str] = (*DRIVES, own.FORMULA),
     ):
         self.moved, self.defined, self.zones = moved, defined, zones
-        structures = [*structures_of(moved.model, laws, defined, zones, drives, elsewhere=moved.elsewhere)]
+        rest = {"elsewhere": moved.elsewhere, "two_way": moved.two_way}
+        structures = [*structures_of(moved.model, laws, defined, zones, drives, **rest)]
         structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
         paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
         paths |= dict.fromkeys(path for structure in structures for path in parameters(structure))

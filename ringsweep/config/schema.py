@@ -13,7 +13,7 @@ from ringsweep.config import axes, neighbours, options, own, uncertain
 from ringsweep.config.scene import STEADY, structures_of
 from ringsweep.config.sections import Keys
 from ringsweep.models import MODELS, parameters
-from ringsweep.models.scene import ELSEWHERE, LAW
+from ringsweep.models.scene import ELSEWHERE, LAW, WAYS
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.formula import COEFFICIENTS
@@ -38,6 +38,8 @@ def schema() -> dict[str, Any]:
                 parameter = dataclasses.replace(parameter, long_name=parameter.long_name.replace("zone 1", "the zone"))
                 known.setdefault(path, {})[parameter] = None
     leaves = {path: _any(*map(_number, meanings)) for path, meanings in known.items()}
+    for path in (f"friction.{name}" for name in (*COEFFICIENTS, "scale")):
+        leaves[path] = _any(leaves[path], _section(dict.fromkeys(WAYS, leaves[path])))
     tables = {f"{of}.{name}": _list(_number(p)) for of, columns in own.TABLES.items() for name, p in columns.items()}
     for of, columns in own.TABLES.items():
         header = ", ".join(f"{name} ({p.unit})".removesuffix(" (1)") for name, p in columns.items())
@@ -172,7 +174,7 @@ def _solver() -> dict[str, Any]:
 def _sweep(paths: list[str]) -> dict[str, Any]:
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
     laws = _list(_laws("friction law"))
-    parameter = r"^(friction|drive|force)\.[A-Za-z][A-Za-z0-9_]*$"
+    parameter = rf"^(friction|drive|force)\.[A-Za-z][A-Za-z0-9_]*(\.({'|'.join(WAYS)}))?$"
     names = {"anyOf": [{"enum": [LAW, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": parameter}]}
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(axes.COUNT)], "minItems": 3, "maxItems": 3}

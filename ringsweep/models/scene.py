@@ -24,6 +24,9 @@ LAW = "friction.law"
 #: Keys of ``friction`` under which the coefficients outside the zones may stand; both have one meaning.
 ELSEWHERE = "elsewhere", "rest"
 
+#: Keys of a friction coefficient that depends on the direction of sliding.
+WAYS = "forward", "backward"
+
 
 class Section(NamedTuple):
     """Points of a motion that a run keeps.
@@ -76,6 +79,8 @@ class Structure:
         Points that a run keeps.
     elsewhere : str
         Which of :data:`ELSEWHERE` the configuration has.
+    two_way : tuple of str
+        Paths of the friction coefficients that are given for both directions, under :data:`WAYS`.
     """
 
     model: str
@@ -93,6 +98,7 @@ class Structure:
     exponent: bool = False
     section: Section | None = None
     elsewhere: str = "rest"
+    two_way: tuple[str, ...] = ()
 
     @property
     def law_type(self) -> type:

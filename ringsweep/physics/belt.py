@@ -72,8 +72,8 @@ class Belt(NamedTuple):
     ----------
     body : NamedTuple
         :class:`OnBelt`, or a type that lacks some of its parts.
-    mu_s, mu_k : float
-        Static and kinetic friction coefficient, 1.
+    mu_s, mu_k : float or TwoWay
+        Static and kinetic friction coefficient, 1; see :mod:`ringsweep.physics.friction.ways`.
     viscous : float
         Coefficient of viscous friction, N s/m.
     law, drive : NamedTuple
@@ -102,8 +102,8 @@ class Belt(NamedTuple):
     """
 
     body: Any
-    mu_s: Leaf
-    mu_k: Leaf
+    mu_s: Any
+    mu_k: Any
     viscous: Leaf
     law: Any
     drive: Any

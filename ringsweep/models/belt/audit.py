@@ -60,7 +60,7 @@ def _violation_on_belt(scene, mode, forcing, y, rates, s, tolerance):
         normal, _, friction = ring.held(body, 1.0, motion, x * x * x, forcing[2], 0.0)
         K = friction / normal if normal != 0.0 else 0.0
         sizes = ring.size(body, (length, push, velocity)) + body.mass * (body.gravity + abs(forcing[2]))
-        largest = (abs(friction) - breakaway_force(scene, x)) / (tolerance * sizes + 1e-300)
+        largest = (abs(friction) - breakaway_force(scene, -friction, x)) / (tolerance * sizes + 1e-300)
     else:
         now = slip_from(scene, x, velocity, v, forcing)
         (K, _), motion = now.K, now.motion

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf, nan
 
 from ringsweep.compile import inlined, unrolled
-from ringsweep.models.belt.force import if_force, length_scale, located
+from ringsweep.models.belt.force import coefficients, if_force, length_scale, located
 from ringsweep.models.interface import implicit, modes
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.physics import belt, drives, ring
@@ -37,7 +37,7 @@ def _error_scales_on_belt(scene, tolerance, x):
 def _slip_of_belt(scene, mode, common, forcing, x):
     """Implement :func:`slip`; `x` is the displacement relative to the belt, m, and the sliding velocity, m/s."""
     v, sign = x[1], 1.0 if x[1] >= 0.0 else -1.0
-    mu, slope = friction_in(scene.law, mode.region, abs(v), (scene.mu_s, scene.mu_k))
+    mu, slope = friction_in(scene.law, mode.region, abs(v), coefficients(scene, float(mode.sign)))
     # In a dead band friction balances all other forces.
     yields = holds_in_band(scene.law) and mode.region < 0
     viscous = 0.0 if yields else if_force(scene.body, scene.viscous, 0.0)

@@ -16,6 +16,7 @@ from ringsweep.physics.belt import OnBelt
 from ringsweep.physics.forces import force_in, force_rate, largest_force
 from ringsweep.physics.friction.registry import dead_band
 from ringsweep.physics.friction.velocity import friction_at
+from ringsweep.physics.friction.ways import TwoWay, along
 
 
 @feature("no", of=ring.having(OnBelt, "force"), absorb=True)
@@ -53,26 +54,33 @@ def slip_from(scene, x, velocity, v, forcing):
     Slip
         Friction balances the other forces in a dead band, as far as it can.
     """
-    mu, slope = friction_at(scene.law, abs(v), (scene.mu_s, scene.mu_k))
+    mu, slope = friction_at(scene.law, abs(v), coefficients(scene, v))
     push, viscous = force_in(scene.drive, forcing), if_force(scene.body, scene.viscous, 0.0)
     held = abs(v) < dead_band(scene.law)
     load, _, friction = ring.held(scene.body, 1.0, (x, push, velocity), x * x * x, 0.0, 0.0)
-    needed = max(-scene.mu_s, min(scene.mu_s, friction / (load + 1e-300)))
+    most = along(scene.mu_s, -friction)
+    needed = max(-most, min(most, friction / (load + 1e-300)))
     K, slope = select(held, needed, opposing(mu, v)), select(held, 0.0, -slope)
     viscous = select(held, 0.0, viscous)
     return Slip((x, push - viscous * v, velocity), v, (K, K), (slope, slope), viscous / scene.body.mass, ())
 
 
 @absorbed
-def breakaway_force(scene, x):
-    """Largest friction force of a stuck contact, N."""
-    return scene.mu_s * ring.reactions(scene.body, 0.0, 0.0, (x, 0.0, 0.0))[0]
+def coefficients(scene, way):
+    """Static and kinetic friction coefficient in a direction; see :func:`ringsweep.physics.friction.ways.along`."""
+    return along(scene.mu_s, way), along(scene.mu_k, way)
+
+
+@absorbed
+def breakaway_force(scene, way, x):
+    """Largest friction force of a stuck contact that is pulled in the direction `way`, N; 0 for the larger of both."""
+    return along(scene.mu_s, way) * ring.reactions(scene.body, 0.0, 0.0, (x, 0.0, 0.0))[0]
 
 
 @inlined
 def located(scene, x, acceleration):
     """Acceleration of the body at the displacement `x`, and the size of its terms, for the recorder."""
-    forces = abs(breakaway_force(scene, x)) + ring.size(scene.body, (x, 0.0, 0.0))
+    forces = abs(breakaway_force(scene, 0.0, x)) + ring.size(scene.body, (x, 0.0, 0.0))
     return shock.Located(acceleration, forces / scene.body.mass + abs(acceleration))
 
 
@@ -85,6 +93,12 @@ def stuck_pull(scene, x, v, forcing):
 
 # Share of the terms of a difference that is more than its rounding: four units in the last place.
 _ROUNDING = 2.0**-50
+
+
+@feature("pull", of=TwoWay)
+def direction(mu_s, pull, scene, t, x, forcing):
+    """Number with the sign of a pull, or of its rate where there is none: one direction may lack friction."""
+    return pull if pull != 0.0 else stuck_rates(scene, t, x, forcing)[0]
 
 
 @inlined
@@ -100,25 +114,25 @@ def rounding_of_reserve(scene, motion, acceleration):
         Acceleration of the belt, m/s^2.
     """
     body = scene.body
-    friction = scene.mu_s * body.mass * body.gravity + abs(breakaway_force(scene, motion[0]))
+    friction = along(scene.mu_s, 0.0) * body.mass * body.gravity + abs(breakaway_force(scene, 0.0, motion[0]))
     return _ROUNDING * (friction + ring.size(body, motion) + body.mass * abs(acceleration))
 
 
 @inlined
 def stuck_rates(scene, t, x, forcing):
-    """Time derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt, N/s."""
+    """Time derivatives of :func:`stuck_pull` and of the load of a body at rest on the belt, N/s."""
     _, velocity, acceleration = forcing[:3]
     push_rate, jerk = force_rate(scene.drive, forcing), drives.jerk_at(scene.drive, t)
     rates, cube_rate = (velocity, push_rate, acceleration), 3.0 * x * x * velocity
     load, _, friction = ring.held(scene.body, 0.0, rates, cube_rate, jerk, 0.0)
-    return -friction, scene.mu_s * load
+    return -friction, load
 
 
 @inlined
 def stuck_gradient(scene, x):
-    """Derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt by place, N/m."""
+    """Derivatives of :func:`stuck_pull` and of the load of a body at rest on the belt by place, N/m."""
     load, _, friction = ring.held(scene.body, 0.0, (1.0, 0.0, 0.0), 3.0 * x * x, 0.0, 0.0)
-    return -friction, scene.mu_s * load
+    return -friction, load
 
 
 @feature("0.0", of=ring.having(OnBelt, "cubic"))
@@ -130,7 +144,7 @@ def _cubic_stiffness(body):
 @inlined
 def _without_spring(scene, velocity):
     """Time in which a body without a spring stops, at most a period or the span, s; and its acceleration, m/s^2."""
-    acceleration = scene.mu_s * scene.body.gravity + largest_force(scene.drive) / scene.body.mass
+    acceleration = along(scene.mu_s, 0.0) * scene.body.gravity + largest_force(scene.drive) / scene.body.mass
     longest, enough = min(scene.forcing_period, scene.span), acceleration > 0.0 and velocity > 0.0
     return min(longest, velocity / acceleration) if enough else longest, acceleration
 

@@ -17,14 +17,16 @@ from numpy.typing import NDArray
 from ringsweep.compile import take
 from ringsweep.errors import InputError
 from ringsweep.models import section, tangent
+from ringsweep.models.belt.force import coefficients
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface.variation import Exponent
 from ringsweep.models.model import Continues, Model, period_of, phases
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
-from ringsweep.models.scene import Structure, Values, require
+from ringsweep.models.scene import WAYS, Structure, Values, require
 from ringsweep.physics import belt, drives, forces, friction, ring
 from ringsweep.physics.friction.presliding import bristle, steady_deflection
 from ringsweep.physics.friction.velocity import KINETIC, friction_at
+from ringsweep.physics.friction.ways import TwoWay
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.variables import Variable
 
@@ -127,7 +129,10 @@ class Belt(Model, Continues):
             "belt.velocity": Parameter("m/s", "velocity of the belt", optional=True),
             "belt.incline": _INCLINE,
         }
-        found |= {f"friction.{name}": p for name, p in friction.coefficients_of(law).items()}
+        for name, p in friction.coefficients_of(law).items():
+            path = f"friction.{name}"
+            both = {f"{path}.{way}": replace(p, long_name=f"{p.long_name}, sliding {way}") for way in WAYS}
+            found |= both if path in structure.two_way else {path: p}
         for name, p in declared(law).items():
             # Laws have stiffness and damping of the bristles per unit of load; a belt scene has them in N/m and N s/m.
             per_load = name.startswith("sigma") and friction.family_of(law) is friction.Dynamic
@@ -172,9 +177,10 @@ class Belt(Model, Continues):
             raise InputError(f"scene.{structure.arcs[0]}", "a belt has no zones")
         values = _on_incline(values)
         law = structure.law_type
-        mu_s, mu_k = friction_coefficients(structure, "friction", values)
+        surfaces = _surfaces(structure, values)
+        mu_s, mu_k = surfaces[0] if len(surfaces) == 1 else map(TwoWay, *surfaces)
         drive = self._drive(structure, values)
-        sliding = np.zeros(len(mu_k))
+        sliding = np.zeros(len(values["time.span"]))
         if "initial.velocity" in values:
             launched = values["initial.velocity"]
             sliding = np.array([drives.relative_velocity(take(drive, i), v) for i, v in enumerate(launched)])
@@ -204,18 +210,19 @@ class Belt(Model, Continues):
             fields["asked"] = Exponent.of(np.maximum(natural, rate), int(friction.family_of(law) is friction.Dynamic))
         # Without a spring the motion has no speed of its own.
         stiffness = values["spring.stiffness"]
-        speed = mu_s * gravity * np.sqrt(np.divide(mass, stiffness, out=np.zeros_like(mass), where=stiffness > 0.0))
+        largest = np.max([static for static, _ in surfaces], axis=0)
+        speed = largest * gravity * np.sqrt(np.divide(mass, stiffness, out=np.zeros_like(mass), where=stiffness > 0.0))
         fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
         if friction.family_of(law) is not friction.Dynamic:
             viscous, load = fields["viscous"], mass * gravity
-            if friction.TRAITS[law].dead_band:
+            for static, kinetic in surfaces if friction.TRAITS[law].dead_band else ():
                 require(
-                    mu_k * load + viscous * values["friction.dead_band"] <= mu_s * load,
+                    kinetic * load + viscous * values["friction.dead_band"] <= static * load,
                     "friction.viscous",
                     viscous,
                     "{} N s/m is too large: friction at the edge of the dead band exceeds friction within it",
                 )
-            scene = belt.Belt(**fields, law=law_of(structure, values, [(mu_s, mu_k)], speed))
+            scene = belt.Belt(**fields, law=law_of(structure, values, surfaces, speed))
             return _at_steady_slip(structure, values, scene) if structure.steady else scene
         require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with bristles needs a load")
         per_load = {
@@ -232,7 +239,7 @@ class Belt(Model, Continues):
             # A run may end beyond the limit by its error.
             deflection = np.clip(deflection, -most, most)
         fields["initial_z"] = deflection
-        scene = belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, [(mu_s, mu_k)], speed))
+        scene = belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, surfaces, speed))
         return _at_steady_slip(structure, values, scene) if structure.steady else scene
 
     def _drive(self, structure: Structure, values: Values) -> Any:
@@ -311,7 +318,7 @@ def _at_steady_slip(structure: Structure, values: Values, scene: Any) -> Any:
 
 def _steady_friction(scene: Any, v: float) -> tuple[float, float]:
     """Friction per load, 1, and deflection of bristles, m, in steady sliding at the velocity `v`, m/s."""
-    law, surface, sign = scene.law, (scene.mu_s, scene.mu_k), np.copysign(1.0, v)
+    law, surface, sign = scene.law, coefficients(scene, v), np.copysign(1.0, v)
     if not isinstance(scene, belt.BristleBelt):
         return sign * friction_at(law, abs(v), surface)[0], 0.0
     z = steady_deflection(law, *surface, v)
@@ -347,6 +354,17 @@ def _periods(structure: Structure, values: Values, period: NDArray[np.float64]) 
         "cycle": np.where((period > 0.0) & (repeats == inf), natural, repeats),
         "place_counts": np.logical_or.reduce([stiffness > 0.0, *rises]).astype(float),
     }
+
+
+def _surfaces(structure: Structure, values: Values) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Static and kinetic friction coefficient; if some coefficient is given for both directions, for each of them."""
+    if not structure.two_way:
+        return [friction_coefficients(structure, "friction", values)]
+    if friction.family_of(structure.law_type) is friction.Dynamic:
+        problem = f"not available with law {structure.law}, whose bristles bend alike both ways: give one number"
+        raise InputError(f"scene.{structure.two_way[0]}", problem)
+    of_ways = ({path: values[f"{path}.{way}"] for path in structure.two_way} for way in WAYS)
+    return [friction_coefficients(structure, "friction", {**values, **of_way}) for of_way in of_ways]
 
 
 def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.float64]:

@@ -202,8 +202,9 @@ def record_at_launch(scene, t, seen, band, play):
     start, end = Mark(t, x, velocity, 0.0, 0.0), cycles.end_of(scene, scene.cycle, 1.0)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
-    pull = max(abs(scene.body.mass * v_rate + force), abs(scene.body.stiffness * x))
-    passes = band > 0.0 and pull > (1.0 + 1e-9) * breakaway_force(scene, x)
+    way = scene.body.mass * v_rate + force
+    pull = max(abs(way), abs(scene.body.stiffness * x))
+    passes = band > 0.0 and pull > (1.0 + 1e-9) * breakaway_force(scene, way, x)
     least = min(_LONGEST_PASSAGE * _pace(scene), _PASSAGE * band * scene.body.mass / pull) if passes else 0.0
     return Record(
         band,
@@ -340,7 +341,7 @@ def _stops(scene, r, now, stuck, place, sliding, force):
     passage = _PASSAGE * max(max(r.band, scale), abs(r.last.v)) / slowing
     # Under a greater pull than that of breakaway a set-valued law would let the body pass, maybe slowly.
     pull = _if_located(scene.body.mass * rate + force, r.last.pull)
-    passes = abs(pull) > (1.0 + 1e-9) * breakaway_force(scene, r.last.x)
+    passes = abs(pull) > (1.0 + 1e-9) * breakaway_force(scene, pull, r.last.x)
     passage = max(passage, select(passes, square_root(r.band * _pace(scene) / slowing), 0.0))
     start = select(anew, before, s.start)
     least = select(anew, min(_LONGEST_PASSAGE * _pace(scene), passage), s.least)
@@ -498,7 +499,7 @@ def _words(scene, r, t, of):
     travel = abs(belt_velocity) * scene.span
     ahead = abs(r.last.x) + travel
     stiffness = scene.body.mass * abs(ring.acceleration_gradient(scene.body, 0.0, 0.0, (ahead, 0.0, 0.0))[0])
-    loads = stiffness * travel > _ROUNDING * 1e-3 * breakaway_force(scene, r.last.x)
+    loads = stiffness * travel > _ROUNDING * 1e-3 * breakaway_force(scene, 0.0, r.last.x)
     if forced:
         # In stick the body may creep, but the belt does not carry it to where the spring pulls it loose.
         stuck, carried = (c.share, c.drift) if repeats else (share, drift)
@@ -556,7 +557,7 @@ def _without_return(parts, scene, r):
     if scene.cycle == inf or first < 1.0:
         return TRANSIENT
     stiffness = scene.body.stiffness
-    force = largest_force(scene.drive) + breakaway_force(scene, 0.0)
+    force = largest_force(scene.drive) + breakaway_force(scene, 0.0, 0.0)
     scale = force / stiffness + abs(r.last.velocity - r.last.v) * _pace(scene) if stiffness > 0.0 else inf
     growth = (begin_2.swing - begin_1.swing) / first
     if c.swing > _BEYOND * scale and growth > 0.0:

@@ -15,6 +15,8 @@ from typing import NamedTuple
 from ringsweep.compile import feature, inlined
 from ringsweep.models.belt.force import (
     breakaway_force,
+    coefficients,
+    direction,
     if_force,
     length_scale,
     located,
@@ -51,6 +53,7 @@ from ringsweep.physics.friction.velocity import (
     shorten_for_decay,
     stiction_band,
 )
+from ringsweep.physics.friction.ways import along
 
 # Rows of the table of series; the guards are last.
 X, V, VELOCITY, ACCELERATION, FORCE, SHIFT, PUSH, SQUARE, CUBE, RATIO, FACTORS = range(11)
@@ -110,11 +113,13 @@ def _begin_on_belt(scene):
 def _mode_at_rest(scene, t, x):
     """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
     forcing = drives.turn(scene.drive, t)
-    pull, bound = stuck_pull(scene, x, 0.0, forcing), breakaway_force(scene, x)
+    pull = stuck_pull(scene, x, 0.0, forcing)
+    bound = breakaway_force(scene, direction(scene.mu_s, pull, scene, t, x, forcing), x)
     least = rounding_of_reserve(scene, (x, force_in(scene.drive, forcing), forcing[1]), forcing[2])
     if bound == 0.0 and pull == 0.0:
         # Rates decide: a load that only begins to grow holds a pull that grows more slowly.
-        (pull, bound), least = stuck_rates(scene, t, x, forcing), 0.0
+        (pull, load), least = stuck_rates(scene, t, x, forcing), 0.0
+        bound = along(scene.mu_s, pull) * load
     if bound > 0.0 and abs(pull) <= bound + least:
         return Mode(0, KINETIC, -1)
     return _loose(scene, 1 if pull >= 0.0 else -1)
@@ -137,7 +142,7 @@ def _switch_on_belt(scene, mode, guard, t, y):
     if sign == 0:
         # A long series may reach the breakaway force by its own error alone: one more, short step decides.
         pull = stuck_pull(scene, x, 0.0, drives.turn(scene.drive, t))
-        if mode.entry_guard != guard and abs(pull) <= breakaway_force(scene, x):
+        if mode.entry_guard != guard and abs(pull) <= breakaway_force(scene, pull, x):
             return RUNNING, Mode(0, KINETIC, guard), y
         return RUNNING, _loose(scene, 1 if guard == SLOW else -1), y
     low, high = region_bounds(scene.law, region)
@@ -205,10 +210,11 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
                 c[X, k] = c[SHIFT, k]
             motion, cube = (c[X, k], c[PUSH, k], c[VELOCITY, k]), _cube_term(body, c, k)
             c[NORMAL, k], _, friction = ring.held(body, one, motion, cube, c[ACCELERATION, k], 0.0)
-            pull, bound = -friction, scene.mu_s * c[NORMAL, k]
+            pull, ahead, back = -friction, along(scene.mu_s, 1.0) * c[NORMAL, k], along(scene.mu_s, -1.0) * c[NORMAL, k]
             if mode.sign == 0:
-                c[V, k], c[FORCE, k], c[SLOW, k], c[FAST, k] = y[1] * one, pull, bound - pull, bound + pull
+                c[V, k], c[FORCE, k], c[SLOW, k], c[FAST, k] = y[1] * one, pull, ahead - pull, back + pull
             else:
+                bound = ahead if mode.sign > 0 else back
                 c[FORCE, k], c[SLOW, k] = mode.sign * bound, mode.sign * pull - bound
                 c[FAST, k] = region_bounds(scene.law, mode.region)[1] * one - mode.sign * c[V, k]
                 if k < ORDER:
@@ -238,7 +244,7 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
     if mode.sign == 0 or yielding:
         # The guards are forces, whose series may converge more slowly than that of the motion.
         motion = length, largest_force(scene.drive), c[VELOCITY, 0]
-        scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, motion) + 1e-300
+        scale = abs(breakaway_force(scene, 0.0, c[X, 0])) + ring.size(body, motion) + 1e-300
         per_force = 1.0 / (scale * tolerance)
     units = (X, 1.0 / (length * tolerance)), (V, 1.0 / (speed * tolerance)), (SLOW, per_force)
     h = step_within(c, units)
@@ -269,7 +275,8 @@ def _expand_slip(scene, mode, viscous, c):
 
     Each coefficient is computed from numbers that are still in registers; the table only keeps it.
     """
-    body, sign, surfaces = scene.body, float(mode.sign), (scene.mu_s, scene.mu_k)
+    body, sign = scene.body, float(mode.sign)
+    surfaces = coefficients(scene, sign)
     x, velocity, v = c[X, 0], c[VELOCITY, 0], c[V, 0]
     (mu,), begun, sharpness = begin_series(scene.law, mode.region, sign * v, surfaces)
     load, _ = ring.reactions(body, 0.0, 0.0, (x, 0.0, velocity))
@@ -321,7 +328,7 @@ def _seen_at_on_belt(scene, mode, c, s, h):
     if mode.sign != 0 and not yielding:
         # Where the law bends, the series of friction is less exact than that of the motion.
         sign, body = float(mode.sign), scene.body
-        mu, _ = friction_in(scene.law, mode.region, sign * v, (scene.mu_s, scene.mu_k))
+        mu, _ = friction_in(scene.law, mode.region, sign * v, coefficients(scene, sign))
         load, _ = ring.reactions(body, 0.0, 0.0, (x, 0.0, velocity))
         before, force = force, sign * mu * load + if_force(body, scene.viscous, 0.0) * v
         acceleration += (before - force) / body.mass

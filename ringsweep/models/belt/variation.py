@@ -18,6 +18,7 @@ from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.bristles import region_guard
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import stiction_band
+from ringsweep.physics.friction.ways import along
 
 # Differences for the gradient of a guard of bristles, as a share of their speed and deflection.
 _SMALL = 1e-4
@@ -77,10 +78,11 @@ def _gradient_on_belt(scene, mode, guard, t, y, rates):
     # The guard is the breakaway force less the pull in one direction.
     way = (1.0 if guard == SLOW else -1.0) if mode.sign == 0 else float(mode.sign)
     forcing = drives.turn(scene.drive, t)
-    pull, bound = stuck_gradient(scene, x)
-    pull_rate, bound_rate = stuck_rates(scene, t, x, forcing)
-    by_x = bound - way * pull
-    rate = bound_rate - way * pull_rate
+    pull, load = stuck_gradient(scene, x)
+    pull_rate, load_rate = stuck_rates(scene, t, x, forcing)
+    mu_s = along(scene.mu_s, way)
+    by_x = mu_s * load - way * pull
+    rate = mu_s * load_rate - way * pull_rate
     return by_x / rate if rate != 0.0 else 0.0, 0.0
 
 

@@ -283,7 +283,7 @@ class _Finder:
         found = self._by_surface(speed)
         if not np.allclose(found, found[0], rtol=1e-12, atol=0.0):
             raise FormulaError(
-                "it switches at a speed that depends on mu_s or mu_k, which differ by zone: "
+                "it switches at a speed that depends on mu_s or mu_k, which differ by zone or direction: "
                 "write the speed as a parameter of its own"
             )
         return np.tile(found[0], self.surfaces)
