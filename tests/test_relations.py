@@ -60,6 +60,7 @@ KINDS = {
     "belt-two-way": Kind(
         "belt", "stiction", force="harmonic", parts=LOADS, span=(2, 20), two_way=BOTH, record={"exponent": True}
     ),
+    "belt-dieterich": Kind("belt", "dieterich", force="harmonic", parts=("initial.contact_age",), span=(1, 8)),
     "ring-exponent": Kind("ring", "hyperbolic", "sinusoidal", arcs=1, record={"exponent": True}),
 }
 

@@ -83,7 +83,7 @@ def put_state(doc: Document, scene: Scene, file: str, before: Any, swept: Collec
         # Runs that ended before their span, or at a motion that is none.
         if flag in (FAILED, SEPARATING, JAMMED):
             raise InputError("", f"its run is {REGIMES[flag]}: it has no state that could go on")
-        names = ("t_end", *model.ends, *({"deflection_end"} & content.variables.keys()))
+        names = ("t_end", *model.ends, *({"deflection_end", "contact_age_end"} & content.variables.keys()))
         ended |= {name: np.ma.filled(content[name][:], np.nan).astype(float).ravel() for name in names}
         if not all(np.isfinite(ended[name]).all() for name in names):
             raise ValueError("a state has finite numbers")

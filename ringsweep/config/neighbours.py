@@ -157,7 +157,7 @@ def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
     dims, _ = axes.columns[path]
     if len(dims) > 1:
         raise InputError(where, f"{path} varies along {' and '.join(dims)}: follow a path with one dimension")
-    replaced = [f"initial.{name}" for name in ("x", "velocity", "deflection", "phi", "omega")]
+    replaced = [f"initial.{name}" for name in ("x", "velocity", "deflection", "contact_age", "phi", "omega")]
     for other, (along, _) in axes.columns.items():
         if dims[0] in along and other in (LAW, *replaced, "force.phase", "drive.phase"):
             what = "a chain has one law" if other == LAW else "the cell before gives it"

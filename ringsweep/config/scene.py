@@ -92,7 +92,9 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     values = _read_numbers(structures, leaves, swept)
     _warn_of_unused_numbers(structures, leaves)
     numbers = numbers_of(structures)
-    _warn_of_lengths({path: values[path] for path, p in numbers.items() if p.unit == "m" and path in values})
+    # Lengths of a friction law are those of asperities.
+    lengths = [path for path, p in numbers.items() if p.unit == "m" and not path.startswith("friction.")]
+    _warn_of_lengths({path: values[path] for path in lengths if path in values})
     for path, parameter in numbers.items():
         if path in leaves:
             warn_of_plain_angle(path, leaves[path], parameter)

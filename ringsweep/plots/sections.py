@@ -23,6 +23,7 @@ from ringsweep.quantities.variables import POINTS, words
 
 # Their full names would take half of a narrow picture.
 _SHORT = {"x_section": "x", "velocity_section": "velocity", "deflection_section": "deflection"}
+_SHORT |= {"contact_age_section": "age"}
 _SHORT |= {"phi_section": r"$\varphi$", "omega_section": r"$\omega$"}
 _SHORT |= {f"deflection_{k}_section": f"deflection {k}" for k in (1, 2)}
 

@@ -122,6 +122,7 @@ HISTORY: dict[str, Variable] = {
     "friction_force": Variable("N", "friction force"),
     "force": Variable("N", "applied force on the body"),
     "deflection": Variable("m", "deflection of the bristles"),
+    "contact_age": Variable("s", "age of the contacts"),
     "deflection_1": Variable("m", "deflection of the bristles at contact 1"),
     "deflection_2": Variable("m", "deflection of the bristles at contact 2"),
     "mode": classes("friction mode", MODES),
@@ -154,6 +155,7 @@ OUTCOMES: dict[str, Variable] = {
     "x_end": Variable("m", "displacement of the body at the end"),
     "velocity_end": Variable("m/s", "velocity of the body at the end"),
     "deflection_end": Variable("m", "deflection of the bristles at the end"),
+    "contact_age_end": Variable("s", "age of the contacts at the end"),
     "started_from": classes(
         "state from which the run started",
         ("initial", "end_of_the_cell_before"),
@@ -220,7 +222,8 @@ OUTCOMES: dict[str, Variable] = {
 
 #: Outcomes that are the points of a section, place and velocity first.
 POINTS = tuple(
-    f"{name}_section" for name in ("x", "velocity", "deflection", "phi", "omega", "deflection_1", "deflection_2")
+    f"{name}_section"
+    for name in ("x", "velocity", "deflection", "contact_age", "phi", "omega", "deflection_1", "deflection_2")
 )
 
 for _point in POINTS:

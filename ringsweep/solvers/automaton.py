@@ -373,7 +373,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         while status == RUNNING:
             # Near a jam, steps shorter than the rounding of time still move the state, but not for ever.
             t = now.t
-            stalled = stalled + 1 if t_before + s == t_before else 0
+            stalled = stalled + 1 if modes.is_lost(scene, t_before, s) else 0
             if n == max_steps or stalled == _MOST_STALLED:
                 status = modes.status_when_stalled(scene, mode, now, y) if stalled == _MOST_STALLED else BROKEN
                 break

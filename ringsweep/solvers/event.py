@@ -55,7 +55,7 @@ _MAGNIFIED = 3.0
 _MOST_VIOLATION, _MOST_UNEXPLAINED = 1e3, 5e-3
 
 # What a friction law of each family is, for messages.
-_WORDS: dict[type, str] = {SetValued: "is set-valued", Smooth: "is smooth", Dynamic: "has bristles"}
+_WORDS: dict[type, str] = {SetValued: "is set-valued", Smooth: "is smooth", Dynamic: "has a memory"}
 
 
 def _select(batch: Any, cells: NDArray[np.intp]) -> Any:

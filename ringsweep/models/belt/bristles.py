@@ -9,8 +9,6 @@ Read :mod:`ringsweep.physics.friction.presliding` first. `sign` is the direction
 
 from __future__ import annotations
 
-from math import sqrt
-
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.belt.force import length_scale
 from ringsweep.models.belt.record import record_at_launch
@@ -24,7 +22,14 @@ from ringsweep.numerics.memory import select_all
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import BristleBelt
 from ringsweep.physics.forces import force_in
-from ringsweep.physics.friction.bristles import after_yield, initial_deflection, region_guard, stick_speed
+from ringsweep.physics.friction.presliding import (
+    after_yield,
+    initial_deflection,
+    region_guard,
+    scales,
+    shown,
+    stick_speed,
+)
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 
 
@@ -39,12 +44,6 @@ def _sliding(scene, motion, x, sign, region):
 def _in_band(scene, v, z, sign):
     """Whether the contact counts as stuck: the guard of the region BAND is positive."""
     return region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0
-
-
-@inlined
-def recoil_speed(scene):
-    """Speed of a body that bristles drive back from their largest deflection, m/s."""
-    return scene.mu_s * sqrt(scene.body.gravity / scene.law.sigma0)
 
 
 @inlined
@@ -74,15 +73,15 @@ def _slip_on_bristle_belt(scene, y, v, forcing, angle):
 def _begin_record_on_bristle_belt(scene, t, seen):
     """Implement :func:`recorder.begin`, for the speed and the distance at which bristles yield."""
     # The body moves so far while its bristles go from one largest deflection to the other.
-    play = 2.0 * scene.mu_s / scene.law.sigma0
-    return record_at_launch(scene, t, seen, stick_speed(scene.law, recoil_speed(scene)), play)
+    length, _, recoil = scales(scene.law, scene.mu_s, scene.body.gravity, scene.initial_z)
+    return record_at_launch(scene, t, seen, stick_speed(scene.law, recoil), 2.0 * length)
 
 
 @recorder.keep_memory.implements(BristleBelt)
 def _keep_deflection(scene, row, column, y):
-    """Implement :func:`recorder.keep_memory`: the deflection of the bristles, m."""
+    """Implement :func:`recorder.keep_memory`: the deflection of the bristles, m, or their age, s."""
     if column < len(row):
-        row[column] = y[2]
+        row[column] = shown(scene.law, y[2])
 
 
 @modes.begin.implements(BristleBelt)
@@ -123,6 +122,12 @@ def _switch_on_bristle_belt(scene, mode, guard, t, y):
     return RUNNING, Mode(mode.sign, region, -1), (x, v, z)
 
 
+@modes.is_lost.implements(BristleBelt)
+def _is_lost_on_bristle_belt(scene, t, s):
+    """Implement :func:`modes.is_lost`: nothing jams, and a contact that stops slows down by many decades."""
+    return s == 0.0
+
+
 @slip.implements(BristleBelt)
 def _slip_of_bristle_belt(scene, mode, common, forcing, x):
     """Implement :func:`slip`; `x` is the displacement relative to the belt, the sliding velocity, the deflection."""
@@ -141,10 +146,10 @@ def _region_guards_on_bristle_belt(scene, mode, common, x):
 @implicit.error_scales.implements(BristleBelt)
 def _error_scales_on_bristle_belt(scene, tolerance, x):
     """Implement :func:`implicit.error_scales`, from the largest deflection that friction can hold."""
-    deflection = scene.mu_s / scene.law.sigma0
+    length, state, speed = scales(scene.law, scene.mu_s, scene.body.gravity, x[2])
     return (
-        tolerance * (length_scale(scene, abs(x[1])) + deflection),
-        tolerance * (abs(x[1]) + recoil_speed(scene)),
-        tolerance * deflection,
+        tolerance * (length_scale(scene, abs(x[1])) + length),
+        tolerance * (abs(x[1]) + speed),
+        tolerance * state,
         tolerance * scene.mu_s * scene.body.gravity,
     )

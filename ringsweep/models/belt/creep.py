@@ -14,6 +14,7 @@ from ringsweep.models.interface import implicit, modes
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.forces import force_in
+from ringsweep.physics.friction.presliding import shown  # noqa: F401
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import friction_in, stiction_band
 
@@ -64,14 +65,14 @@ def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
     normal, _ = ring.reactions(body, *now.K, now.motion)
     friction = now.damping * body.mass * x[1] - now.K[0] * normal
     place, _, velocity = now.motion
-    seen = place, velocity, acceleration, friction, x[0], x[1], forcing[2], deflection(x, nan)
+    seen = place, velocity, acceleration, friction, x[0], x[1], forcing[2], deflection(x, scene.law, nan)
     return all_guards(body, normal, *region_guards(scene, mode, common, x)), seen
 
 
 @unrolled
-def deflection(length, x, missing):
-    """Deflection of the bristles; `missing` without bristles."""
-    return ["return x[2]" if length > 2 else "return missing"]
+def deflection(length, x, law, missing):
+    """Deflection of the bristles, m, or their age, s; `missing` without bristles."""
+    return ["return shown(law, x[2])" if length > 2 else "return missing"]
 
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
@@ -100,4 +101,4 @@ def _near_zero_on_belt(scene, motion):
 def _row_on_belt(scene, mode, forcing, y, seen):
     """Implement :func:`modes.row`: displacement, velocity, friction, deflection, and -1, 0 or 1 for the mode."""
     x, velocity, friction = seen[:3]
-    return x, velocity, friction, deflection(y, 0.0), 0.0 if mode.region < 0 else float(mode.sign)
+    return x, velocity, friction, deflection(y, scene.law, 0.0), 0.0 if mode.region < 0 else float(mode.sign)

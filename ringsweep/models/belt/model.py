@@ -30,9 +30,6 @@ from ringsweep.physics.friction.ways import TwoWay
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.variables import Variable
 
-#: Variables of a point of a section: displacement and velocity, and under a law with bristles their deflection.
-SECTION = "x_section", "velocity_section", "deflection_section"
-
 # Relative error of a deflection at the loosest tolerance.
 _LOOSEST = 1e-3
 
@@ -78,8 +75,9 @@ class Belt(Model, Continues):
     def columns(self, structure: Structure) -> tuple[str, ...]:
         """Outcomes, and after them exponent and multipliers, the deflection of bristles, the points of the section."""
         exponent = tangent.OUTCOMES if structure.exponent else ()
-        bristles = ("deflection_end",) if friction.family_of(structure.law_type) is friction.Dynamic else ()
-        return (*self.outcomes, *exponent, *bristles, *section.columns(structure.section, SECTION))
+        law = friction.TRAITS[structure.law_type]
+        memory = (f"{law.state}_end",) if law.family is friction.Dynamic else ()
+        return (*self.outcomes, *exponent, *memory, *section.columns(structure.section, _point(structure)))
 
     def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
         """Displacement, velocity, deflection and phases at the end of other runs.
@@ -90,6 +88,8 @@ class Belt(Model, Continues):
         if "initial.deflection" in values:
             most = _largest_deflection(structure, _on_incline(values))
             found["initial.deflection"] = np.clip(ended["deflection_end"], -most, most)
+        if friction.TRAITS[structure.law_type].state == "contact_age" and "contact_age_end" in ended:
+            found["initial.contact_age"] = ended["contact_age_end"]
         return found | phases(("force", "drive"), values, ended)
 
     def obstacle(self, structure: Structure) -> str | None:
@@ -111,7 +111,7 @@ class Belt(Model, Continues):
 
     def history(self, structure: Structure) -> tuple[str, ...]:
         """Names of the history variables, in the order of their columns."""
-        return "x", "velocity", "friction_force", "deflection", "mode"
+        return "x", "velocity", "friction_force", friction.TRAITS[structure.law_type].state, "mode"
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Parameters of a scene of this structure, by path."""
@@ -161,14 +161,17 @@ class Belt(Model, Continues):
             "initial.velocity": Parameter(
                 "m/s", "velocity of the body at the start (default: that of the belt)", optional=True
             ),
-            **self._deflection(structure),
+            **self._initial_state(structure),
         }
 
-    def _deflection(self, structure: Structure) -> dict[str, Parameter]:
-        """The initial deflection, if the law has one that describes its state."""
+    def _initial_state(self, structure: Structure) -> dict[str, Parameter]:
+        """The initial deflection or age, if the law has one that describes its state."""
         law = structure.law_type
         if friction.family_of(law) is not friction.Dynamic or friction.TRAITS[law].snaps:
             return {}
+        if friction.TRAITS[law].state == "contact_age":
+            about = "age of the contacts at the start (default: that of steady sliding at the initial speed)"
+            return {"initial.contact_age": Parameter("s", about, lower=0.0, open_lower=True, optional=True)}
         return {"initial.deflection": Parameter("m", "deflection of the bristles at the start", default=0.0)}
 
     def build(self, structure: Structure, values: Values) -> belt.Belt | belt.BristleBelt:
@@ -202,7 +205,7 @@ class Belt(Model, Continues):
         if structure.section is not None or not isinstance(forced, drives.Constant):
             fields["excited"] = belt.Excited()
         if structure.section is not None:
-            fields["section"] = section.field(structure.section, SECTION, len(mass))
+            fields["section"] = section.field(structure.section, _point(structure), len(mass))
         fields |= _periods(structure, values, np.broadcast_to(drives.period(forced), mass.shape))
         if structure.exponent:
             rate = 2.0 * np.pi / np.minimum(fields["forcing_period"], values["time.span"])
@@ -224,7 +227,7 @@ class Belt(Model, Continues):
                 )
             scene = belt.Belt(**fields, law=law_of(structure, values, surfaces, speed))
             return _at_steady_slip(structure, values, scene) if structure.steady else scene
-        require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with bristles needs a load")
+        require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with a memory needs a load")
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
         }
@@ -239,6 +242,11 @@ class Belt(Model, Continues):
             # A run may end beyond the limit by its error.
             deflection = np.clip(deflection, -most, most)
         fields["initial_z"] = deflection
+        if friction.TRAITS[law].state == "contact_age":
+            speed_0, distance = values["friction.reference_velocity"], values["friction.critical_distance"]
+            # No age is steady at rest: there the contacts have that of the reference velocity.
+            steady = distance / np.where(sliding == 0.0, speed_0, abs(sliding))
+            fields["initial_z"] = np.log(speed_0 * values.get("initial.contact_age", steady) / distance)
         scene = belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, surfaces, speed))
         return _at_steady_slip(structure, values, scene) if structure.steady else scene
 
@@ -361,10 +369,15 @@ def _surfaces(structure: Structure, values: Values) -> list[tuple[NDArray[np.flo
     if not structure.two_way:
         return [friction_coefficients(structure, "friction", values)]
     if friction.family_of(structure.law_type) is friction.Dynamic:
-        problem = f"not available with law {structure.law}, whose bristles bend alike both ways: give one number"
+        problem = f"not available with law {structure.law}, whose contacts are alike both ways: give one number"
         raise InputError(f"scene.{structure.two_way[0]}", problem)
     of_ways = ({path: values[f"{path}.{way}"] for path in structure.two_way} for way in WAYS)
     return [friction_coefficients(structure, "friction", {**values, **of_way}) for of_way in of_ways]
+
+
+def _point(structure: Structure) -> tuple[str, ...]:
+    """Variables of a point of a section: displacement and velocity, and the state of a law with a memory."""
+    return "x_section", "velocity_section", f"{friction.TRAITS[structure.law_type].state}_section"
 
 
 def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.float64]:

@@ -51,4 +51,4 @@ def _seen_in_constant_step_on_belt(scene, y, now):
 def _row_of_constant_step_on_belt(scene, y, forcing):
     """Implement :func:`constant_step.row`: the same columns as :func:`modes.row` on the belt."""
     now = constant_step.inspect(scene, y, forcing)
-    return y[0], now.motion[2], now.friction, deflection(y, 0.0), word_of_mode(scene, now)
+    return y[0], now.motion[2], now.friction, deflection(y, scene.law, 0.0), word_of_mode(scene, now)

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from ringsweep.compile import feature, hook
 from ringsweep.models import section, tangent
-from ringsweep.models.belt.bristles import recoil_speed
 from ringsweep.models.belt.force import stuck_gradient, stuck_rates
 from ringsweep.models.belt.record import with_tangent
 from ringsweep.models.belt.series import SLOW
 from ringsweep.models.interface import variation
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import Belt, BristleBelt
-from ringsweep.physics.friction.bristles import region_guard
+from ringsweep.physics.friction.presliding import region_guard, scales
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.physics.friction.ways import along
@@ -93,7 +92,8 @@ def _gradient_on_bristle_belt(scene, mode, guard, t, y, rates):
     by_v, by_z = 1.0, 0.0
     if ring.if_load_varies(scene.body, guard - 1, guard) == 1:
         law, mu_s, mu_k, sign, region = scene.law, scene.mu_s, scene.mu_k, float(mode.sign), mode.region
-        dv, dz = _SMALL * recoil_speed(scene), _SMALL * mu_s / law.sigma0
+        _, state, speed = scales(law, mu_s, scene.body.gravity, z)
+        dv, dz = _SMALL * speed, _SMALL * state
         above = region_guard(law, mu_s, mu_k, v + dv, z, sign, region)
         by_v = (above - region_guard(law, mu_s, mu_k, v - dv, z, sign, region)) / (2.0 * dv)
         above = region_guard(law, mu_s, mu_k, v, z + dz, sign, region)

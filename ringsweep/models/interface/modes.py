@@ -63,6 +63,15 @@ def switch(scene, mode, guard, t, y):
 
 
 @hook(optional=True)
+def is_lost(scene, t, s):
+    """Whether a step of length `s` from the time `t`, both in s, counts as none; a run ends after hundreds of them.
+
+    By default one that rounding takes from the time: near a jam such steps still move the state, but not for ever.
+    """
+    return t + s == t
+
+
+@hook(optional=True)
 def status_when_stalled(scene, mode, t, y):
     """Status of a run whose steps shrink to nothing.
 

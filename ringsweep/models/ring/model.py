@@ -116,11 +116,11 @@ class SingleContactRing(Model, Continues):
         return "resting", "oscillatory", "revolving", "separating", "jammed", "failed"
 
     def takes(self, law: type) -> bool:
-        """Laws without a dead band; laws with bristles need ``steady_deflection``."""
+        """Laws without a dead band; those with a memory need bristles and ``steady_deflection``."""
         traits = friction.TRAITS[law]
-        return not traits.dead_band and (
-            traits.family is not friction.Dynamic or steady_deflection.body_of(law) is not None
-        )
+        if traits.family is friction.Dynamic:
+            return traits.state == "deflection" and steady_deflection.body_of(law) is not None
+        return not traits.dead_band
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleRing`` for laws with bristles, else ``Ring``."""

@@ -7,7 +7,7 @@ where the load is the weight of the body, and on the ring, where the reactions v
 from importlib import import_module
 from pkgutil import iter_modules
 
-from ringsweep.physics.friction import bristles, laws  # noqa: F401
+from ringsweep.physics.friction import bristles, laws, rate_and_state  # noqa: F401
 from ringsweep.physics.friction.registry import (
     LAWS,
     TRAITS,
@@ -21,7 +21,7 @@ from ringsweep.physics.friction.registry import (
     family_of,
 )
 
-for _name, (_law, _traits) in bristles.LAWS.items():
+for _name, (_law, _traits) in (bristles.LAWS | rate_and_state.LAWS).items():
     add_law(_name, _law, _traits)
 
 __all__ = [

@@ -9,6 +9,8 @@ launch.
 
 from __future__ import annotations
 
+from math import sqrt
+
 from ringsweep.compile import hook
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.quantities.parameters import Parameter
@@ -120,6 +122,33 @@ def initial_deflection(law, mu_s, mu_k):
         As for :func:`bristle`.
     """
     return 0.0
+
+
+@hook(optional=True)
+def scales(law, mu_s, gravity, z):
+    """Units of errors: play of the contact, m, unit of the state z, and speed, m/s, as tuple.
+
+    By default both lengths are the deflection that carries the static friction. The speed is that of a body which these
+    bristles drive back.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    mu_s : float
+        Static coefficient, 1.
+    gravity : float
+        Normal load per unit of the mass, m/s^2.
+    z : float
+        State.
+    """
+    deflection = mu_s / law.sigma0
+    return deflection, deflection, mu_s * sqrt(gravity / law.sigma0)
+
+
+@hook(optional=True)
+def shown(law, z):
+    """State as users see it, in the unit of the history variable that is named in the traits; by default z, m."""
+    return z
 
 
 @hook

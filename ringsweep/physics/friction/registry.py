@@ -24,7 +24,7 @@ class Smooth(NamedTuple):
 
 
 class Dynamic(NamedTuple):
-    """Family of laws with a memory: friction depends on the deflection of bristles."""
+    """Family of laws with a memory: friction depends on the deflection of bristles, or on their age."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,8 @@ class Traits:
         Names of two parameters; the first value must be less than the second.
     snaps : bool
         Whether its memory jumps at certain instants; only methods with events find these.
+    state : str
+        Name of the history variable that shows the state of a law with a memory.
     dead_band : bool
         Whether a contact within the stiction band keeps its speed. Then the drive must be steady.
     source : str
@@ -51,9 +53,12 @@ class Traits:
     coefficients: tuple[str, ...] = ("mu_s", "mu_k")
     ascending: tuple[str, str] | None = None
     snaps: bool = False
+    state: str = "deflection"
     dead_band: bool = False
     source: str = ""
 
+
+MU_0 = Parameter("1", "friction coefficient of steady sliding at the reference velocity", lower=0.0, open_lower=True)
 
 #: Laws by the name that the configuration gives them.
 LAWS: dict[str, type] = {}
@@ -122,5 +127,5 @@ def family_of(law: type) -> type:
 
 def coefficients_of(law: type) -> dict[str, Parameter]:
     """Parameters of the friction coefficients that a law needs of each surface."""
-    known = {"mu_s": MU_S, "scale": SCALE, "mu_k": presliding.MU_K if family_of(law) is Dynamic else MU_K}
+    known = {"mu_s": MU_S, "scale": SCALE, "mu0": MU_0, "mu_k": presliding.MU_K if family_of(law) is Dynamic else MU_K}
     return {name: known[name] for name in TRAITS[law].coefficients}
