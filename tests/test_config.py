@@ -424,7 +424,11 @@ NEAR = "`amplitude`? (known: law", "`mu_k`? (known: mu_k"
     [
         ({"drive": {"law": "constant", "speed": 1}}, "drive.speed", f"; did you mean {NEAR[0]}, amplitude)"),
         ({"drive": {"law": "sinusoidal", "rate": 1}}, "drive.rate", " (known: law, amplitude, frequency, phase)"),
-        ({"drive": {"law": "formula", "theta": "A*t", "A": 1, "fil": 2}}, "drive.fil", " (known: law, theta, A)"),
+        (
+            {"drive": {"law": "formula", "theta": "A*t", "A": 1, "fil": 2}},
+            "drive.fil",
+            " (known: law, theta, velocity, A)",
+        ),
         ({"friction": {"law": "coulomb", "rough": {"mu": 1}}}, "friction.rough.mu", f"; did you mean {NEAR[1]})"),
     ],
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 
 import ringsweep
 from ringsweep.compile import take
@@ -158,6 +158,63 @@ class TestDerived:
         drive = take(drive_of(by("A*sin(w*t + p) + A*sin(3*w*t + q)", A=0.3, w=40.0, p="90 deg", q="270 deg")), 0)
         assert drives.turn(drive, 0.0)[1] != 0.0
         assert drives.relative_velocity(drive, 0.0) == 0.0
+
+
+#: Velocities as formulas, and the places that they lead to from 0 on; V is a speed, T a time.
+PLACES = {
+    "V*(1 + sin(t/T)/2)": "V*(t + T*(1 - cos(t/T))/2)",
+    "V*atan(t/T)": "V*(t*atan(t/T) - T*log(1 + (t/T)**2)/2)",
+    "V*(1 - exp(-t/T))": "V*(t - T*(1 - exp(-t/T)))",
+    "V*tanh(t/T)": "V*(t + T*(log(1 + exp(-2*t/T)) - log(2)))",
+    "V*t/T*exp(-t/T)": "V*(T - (t + T)*exp(-t/T))",
+    "V*(t/T)**2*cos(t/T)": "V*((t**2/T - 2*T)*sin(t/T) + 2*t*cos(t/T))",
+    "piecewise(t < T, V*t/T, t < 2*T, V, V*exp(2 - t/T))": (
+        "piecewise(t < T, V*t**2/T/2, t < 2*T, V*(t - T/2), V*T*(3/2 + 1 - exp(2 - t/T)))"
+    ),
+    "V": "V*t",
+}
+
+
+class TestVelocity:
+    """A drive by the formula of its velocity moves as one by the integral of it."""
+
+    @pytest.mark.parametrize(("velocity", "theta"), PLACES.items(), ids=list(PLACES))
+    def test_place_is_the_integral_of_the_velocity(self, velocity, theta):
+        parameters = {"V": 0.7} | ({"T": 1.3} if "T" in velocity else {})
+        by_rate = {"law": "formula", "velocity": velocity, **parameters}
+        a, b = (take(drive_of(section), 0) for section in (by_rate, by(theta, **parameters)))
+        assert drives.turn(a, 0.0)[0] == 0.0
+        for t in (0.2, 1.3, 2.0, 4.4, 1e3):
+            np.testing.assert_allclose(drives.turn(a, t), drives.turn(b, t), rtol=1e-12, atol=1e-14)
+            expected = series_of(b, t)
+            np.testing.assert_allclose(series_of(a, t), expected, rtol=1e-10, atol=1e-13 * abs(expected).max())
+        assert drives.period(a) == pytest.approx(drives.period(b))
+
+    def test_place_is_that_of_quadrature_where_a_velocity_rises_within_a_short_time(self):
+        section = {"law": "formula", "velocity": "V*(1 + tanh((t - t1)/w))/2", "V": 0.7, "t1": 1.0, "w": 0.02}
+        drive = take(drive_of(section), 0)
+        place, _ = quad(lambda t: drives.turn(drive, t)[1], 0.0, 1.7, points=[0.9, 1.0, 1.1], epsabs=1e-14)
+        assert drives.turn(drive, 1.7)[0] == pytest.approx(place, rel=1e-13)
+        assert drives.next_knot(drive, 1.5) - 1.5 > drives.next_knot(drive, 0.99) - 0.99
+
+    @pytest.mark.parametrize(
+        ("section", "message"),
+        [
+            ({"velocity": "V*sin(t*t/T/T)", "V": 1, "T": 1}, "drive.velocity: .*its integral is not known: known"),
+            ({"velocity": "V*log(1 + t/T)", "V": 1, "T": 1}, "drive.velocity: .*; give theta"),
+            ({"velocity": "piecewise(t < T, V, 2*V)", "V": 1, "T": 1}, "drive.velocity: .*the angular velocity jumps"),
+            ({"velocity": "velocity*sin(w*t)", "w": 1}, "drive.velocity: is the formula: give its parameter another"),
+            ({"velocity": "V*sin(w*t)", "theta": "A*sin(w*t)", "A": 1, "V": 1, "w": 1}, "cannot stand beside theta"),
+            ({"velocity": "V*sin(w*t)", "V": "1 rad", "w": 1}, "drive.V: .*wrong unit: .* is in rad/s"),
+            ({"velocity": 2.0}, "drive.velocity: 2.0: a formula is a text"),
+        ],
+    )  # fmt: skip
+    def test_mistakes_are_told_by_the_path_of_the_velocity(self, section, message):
+        assert re.search(message, refused(ring({"law": "formula"} | section)))
+
+    def test_parameter_of_a_place_may_be_called_velocity(self):
+        drive = take(drive_of(by("velocity*t", velocity=0.7)), 0)
+        assert drives.turn(drive, 2.0)[:2] == (1.4, 0.7)
 
 
 class TestSwitches:

@@ -169,7 +169,7 @@ def read_laws(
 
 
 def drive_type(model: str, drive: Mapping[str, Any]) -> type | None:
-    """Type of the drive if the section ``drive`` has the formula ``theta``.
+    """Type of the drive if the section ``drive`` has the formula ``theta``, or that of its rate, ``velocity``.
 
     Raises
     ------
@@ -178,10 +178,16 @@ def drive_type(model: str, drive: Mapping[str, Any]) -> type | None:
     """
     if drive.get("law") != FORMULA:
         return None
-    if "theta" not in drive:
-        raise InputError("scene.drive.theta", "missing: the formula of the motion, such as A*sin(2*pi*f*t)")
-    texts = {"mu": ("scene.drive.theta", drive["theta"])}
-    return _defined(lambda: drives.define(drive["theta"], MODELS[model].drive_unit), texts)
+    key = "velocity" if "theta" not in drive and "velocity" in drive else "theta"
+    if key not in drive:
+        problem = "missing: the formula of the motion, such as A*sin(2*pi*f*t), or of its rate under velocity"
+        raise InputError("scene.drive.theta", problem)
+    unit = MODELS[model].drive_unit + "/s" * (key == "velocity")
+    found = _defined(lambda: drives.define(drive[key], unit), {"mu": (f"scene.drive.{key}", drive[key])})
+    if "velocity" in drive and ("velocity" in declared(found)) == (key == "velocity"):
+        problem = "cannot stand beside theta" if key == "theta" else "is the formula: give its parameter another name"
+        raise InputError("scene.drive.velocity", problem)
+    return found
 
 
 def force_type(force: Any) -> type | None:

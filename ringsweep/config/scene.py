@@ -257,7 +257,8 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
     yield from ("model", LAW, "drive.law", "friction.laws")
     takes_force = _takes_force(model)
     by_formula = {"friction.mu": own.FORMULA in laws, "friction.at_rest": own.FORMULA in laws}
-    by_formula |= {"drive.theta": drive == own.FORMULA, "force.formula": takes_force, "initial.steady": takes_force}
+    by_formula |= dict.fromkeys(("drive.theta", "drive.velocity"), drive == own.FORMULA)
+    by_formula |= dict.fromkeys(("force.formula", "initial.steady"), takes_force)
     yield from (path for path, is_used in by_formula.items() if is_used)
     by_table = {"drive": drive == "table", "force": takes_force, "friction": own.TABLE_LAW in laws}
     yield from (f"{of}.{key}" for of, keys in own.TABLE_KEYS.items() if by_table[of] for key in keys)

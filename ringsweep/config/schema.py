@@ -45,7 +45,7 @@ def schema() -> dict[str, Any]:
         header = ", ".join(f"{name} ({p.unit})".removesuffix(" (1)") for name, p in columns.items())
         tables[f"{of}.file"] = _text(f"CSV file with columns {header.replace('time', 't')}")
     by_formula = _keys(own.LAW_KEYS, mu=_TEXT, at_rest={"enum": [*COEFFICIENTS]})
-    drives = _meanings(DRIVES) | {own.FORMULA: "A formula of the time, under theta"}
+    drives = _meanings(DRIVES) | {own.FORMULA: "A formula of the time, under theta or velocity"}
     scene = _nest(
         {
             "model": _word("what moves", _meanings(MODELS)),
@@ -59,6 +59,7 @@ def schema() -> dict[str, Any]:
             **tables,
             **{f"{of}.interpolate": _word("what joins the rows", joins) for of, joins in own.INTERPOLATIONS.items()},
             "friction.mu": _any(by_formula["mu"], tables["friction.mu"]),
+            "drive.velocity": _text("velocity or angular velocity as a formula of the time t, in place of theta"),
             "drive.theta": _any(_text("angle or displacement as a formula of the time t, s"), tables["drive.theta"]),
             **leaves,
         }

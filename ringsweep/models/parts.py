@@ -116,7 +116,7 @@ def drive_of(structure: Structure, values: Values) -> Any:
         If the table of a drive ends before the span of time, or if the formula of a drive is not smooth.
     """
     if structure.table is None:
-        return by_formula(structure.drive_type, "drive", "theta", values)
+        return by_formula(structure.drive_type, "drive", structure.drive_key, values)
     columns = {field: values[f"drive.{field}"] for field in declared(structure.drive_type)}
     return table_of(*structure.table, columns["amplitude"], "drive", values)
 

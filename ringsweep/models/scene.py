@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.physics.drives import DRIVES
+from ringsweep.physics.drives import DRIVES, FORMULAS
 from ringsweep.physics.friction import LAWS
 
 Values = Mapping[str, NDArray[np.float64]]
@@ -109,6 +109,11 @@ class Structure:
     def drive_type(self) -> type:
         """Type of the drive."""
         return self.own_drive or DRIVES[self.drive]
+
+    @property
+    def drive_key(self) -> str:
+        """Key of ``drive`` that has its formula."""
+        return "velocity" if self.own_drive is not None and FORMULAS[self.own_drive].by_rate else "theta"
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 import numpy as np
@@ -222,6 +222,78 @@ def substitute(a: Node, values: Mapping[Node, Node]) -> Node:
         return done[node]
 
     return visit(a)
+
+
+#: Antiderivatives of functions f of x, from f and x.
+_ANTIDERIVATIVES: dict[str, Callable[[Node, Node], Node]] = {
+    "exp": lambda f, x: f,
+    "sin": lambda f, x: negative(function("cos", x)),
+    "cos": lambda f, x: function("sin", x),
+    "tanh": lambda f, x: add(x, function("log1p", function("exp", multiply(number(-2.0), x)))),
+    "atan": lambda f, x: add(multiply(x, f), multiply(number(-0.5), function("log1p", multiply(x, x)))),
+}
+
+# Highest degree of a polynomial that is integrated.
+_MOST_POWERS = 8
+
+
+def integral(a: Node, thresholds: Mapping[int, Node]) -> Node:
+    """Integral of an expression from the time 0 on.
+
+    Integrated are polynomials, the functions above of straight lines, the first three also times a polynomial, and
+    sums and pieces of all these.
+
+    Parameters
+    ----------
+    a : Node
+    thresholds : mapping of int to Node
+        Times of the switches, by index. A switch within the later piece of another one comes later, else earlier.
+
+    Raises
+    ------
+    ValueError
+        If a part of the expression is none of these.
+    """
+    p = a.parts
+    if slopes := _slopes_at_start(a):
+        terms = (multiply(number(1.0 / math.factorial(k)), slope) for k, slope in enumerate(slopes, 1))
+        powers = (power(TIME, number(k)) for k in range(1, len(slopes) + 1))
+        return reduce(add, map(multiply, terms, powers))
+    if a.kind == "add":
+        return add(*(integral(part, thresholds) for part in p))
+    if a.kind == "multiply" and not p[0].varies:
+        return multiply(p[0], integral(p[1], thresholds))
+    if a.kind == "switch" and a.value in thresholds:
+        below, above = (integral(part, thresholds) for part in p)
+        before, after = _on_side(below, thresholds[a.value], 1), _on_side(above, thresholds[a.value], 0)
+        return switch(a.value, below, add(above, add(before, negative(after))))
+    # By parts, until nothing is left of the polynomial.
+    factor, f = (ONE, a) if a.kind != "multiply" else p if _slopes_at_start(p[0]) else p[::-1]
+    known = _ANTIDERIVATIVES if factor is ONE else ("exp", "sin", "cos")
+    if f.kind not in known or not _slopes_at_start(factor) or len(slopes := _slopes_at_start(f.parts[0])) != 2:
+        raise ValueError
+    whole = divide(_ANTIDERIVATIVES[f.kind](f, f.parts[0]), slopes[1])
+    found = multiply(factor, whole)
+    found = add(found, negative(substitute(found, {TIME: ZERO})))
+    return add(found, negative(integral(multiply(derivative(factor), whole), thresholds)))
+
+
+def _slopes_at_start(a: Node) -> list[Node]:
+    """Value and derivatives of a polynomial at the time 0; empty for another expression."""
+    found: list[Node] = []
+    while a.varies and len(found) <= _MOST_POWERS and not any(node.kind == "switch" for node in nodes_of(a)):
+        found.append(substitute(a, {TIME: ZERO}))
+        a = derivative(a)
+    return [] if a.varies else [*found, a]
+
+
+def _on_side(a: Node, time: Node, side: int) -> Node:
+    """Value of an expression at a time, before all its switches (0) or after them (1)."""
+    values = {TIME: time}
+    for node in nodes_of(a):
+        if node.kind == "switch":
+            values[node] = substitute(node.parts[side], values)
+    return substitute(a, values)
 
 
 def frequency(angle: Node) -> tuple[Node, Node, Node] | None:

@@ -26,7 +26,15 @@ from ringsweep.numerics.series import INVERSE
 from ringsweep.physics import functions_of_time
 from ringsweep.physics.definitions import Definitions
 from ringsweep.physics.friction.formula import FormulaError
-from ringsweep.physics.functions_of_time import Function, check, knots_of, period_of, read_function, size_at_start
+from ringsweep.physics.functions_of_time import (
+    Function,
+    check,
+    knots_of,
+    period_of,
+    read_function,
+    read_rate,
+    size_at_start,
+)
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 #: Unit of the amplitude of a power law, by that of the drive.
@@ -630,7 +638,7 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
     time_for.implements(drive)(_instant_itself)
     implement(top_speed, "drive", ["now = rest = 0.0", *number(size_at_start(function.rate))])
     # The drives of the package have no narrow features.
-    reach = writer.reach_lines(names, s, _SIDE) if qualified else []
+    reach = writer.reach_lines(names, rate if function.by_rate else s, _SIDE) if qualified else []
     if function.knots or reach:
         lines = [*_TIME, "h = inf", *reach, "found = t + h"]
         lines += ["for knot in drive.knots:", "    if t < knot < found:", "        found = knot"] * bool(function.knots)
@@ -701,7 +709,8 @@ def define(text: str, unit: str) -> type:
     ----------
     text : str
     unit : str
-        ``rad`` for the angle of a ring, ``m`` for the displacement of a belt, ``N`` for a force.
+        ``rad`` for the angle of a ring, ``m`` for the displacement of a belt, ``N`` for a force; ``rad/s`` and ``m/s``
+        for their rates.
 
     Raises
     ------
@@ -712,14 +721,14 @@ def define(text: str, unit: str) -> type:
 
 
 def _defined(name: str, qualified: str, text: str, unit: str) -> type:
-    """Type of a drive (``unit`` rad or m) or force (N) by formula; `qualified` is its name in kernels.
+    """Type of a drive (``unit`` rad or m, or these per s) or force (N) by formula; `qualified` is its name in kernels.
 
     Raises
     ------
     FormulaError
         If the formula does not depend on t and on a parameter with the unit, or is too long.
     """
-    function = read_function(text, unit)
+    function = read_rate(text, unit) if unit.endswith("/s") else read_function(text, unit)
     if not function.value.varies or not function.units:
         raise FormulaError("it must depend on t, and on a parameter, which has the unit")
     what = "force" if unit == "N" else "drive"

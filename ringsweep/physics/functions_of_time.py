@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import inf
 from typing import Any
@@ -28,6 +28,7 @@ from ringsweep.numerics.expressions import (
     derivative,
     evaluate,
     frequency,
+    integral,
     multiply,
     negative,
     nodes_of,
@@ -62,6 +63,8 @@ class Function:
     knots : tuple of Threshold
     units : dict of str to str
         Units of the parameters; ``""`` where the unit does not follow from the formula.
+    by_rate : bool
+        Whether `text` is the formula of the rate.
     """
 
     text: str
@@ -70,11 +73,13 @@ class Function:
     unit: str
     knots: tuple[Threshold, ...]
     units: Mapping[str, str]
+    by_rate: bool = False
 
     @property
     def factors(self) -> tuple[Node, Node]:
         """The function as a product: a constant, its *amplitude*, and its *shape*."""
-        if self.value.kind == "multiply" and not self.value.parts[0].varies:
+        product = self.value.kind == "multiply" and not self.value.parts[0].varies
+        if product and (self.rate is derivative(self.value) or self.rate.parts[:1] == self.value.parts[:1]):
             return self.value.parts[0], self.value.parts[1]
         return ONE, self.value
 
@@ -137,6 +142,25 @@ def read_function(text: Any, unit: str, rate: str | None = None, *, infer_units:
     if infer_units:
         units.equal(units.visit(tree), unit_of(unit), f"the formula, which is in {unit}")
     return Function(text, value, slope, unit, tuple(reader.thresholds), units.solved())
+
+
+def read_rate(text: Any, unit: str) -> Function:
+    """Read a function of the time, zero at t = 0, from its rate in `unit`, such as rad/s; see :func:`read_function`.
+
+    Raises
+    ------
+    FormulaError
+        If the text is no such formula, or has an integral that is not known.
+    """
+    rate = read_function(text, unit)
+    try:
+        value = integral(rate.value, {i: knot.at for i, knot in enumerate(rate.knots) if knot.at is not None})
+    except ValueError:
+        raise FormulaError(
+            "its integral is not known: known are polynomials, exp, sin, cos, tanh and atan of straight lines in t, "
+            "products of a polynomial and one exp, sin or cos, and sums and piecewise(t < t1, ...) of these; give theta"
+        ) from None
+    return replace(rate, value=value, rate=rate.value, unit=unit.removesuffix("/s"), by_rate=True)
 
 
 # ---- knots ------------------------------------------------------------------------------------

@@ -71,7 +71,7 @@ def identity(config: Config) -> dict[str, str]:
             found[f"scene.{path}"] = f"a table of {len(table[0])} rows ({_digest(*table[:2])})"
             found |= {f"scene.{path}.interpolate": interpolate for interpolate in table[2:]}
     formulas = {f"friction.laws.{law}": own.own_law for law, own in scene.structures.items()}
-    formulas |= {"drive.theta": structure.own_drive, "force.formula": structure.own_force}
+    formulas |= {f"drive.{structure.drive_key}": structure.own_drive, "force.formula": structure.own_force}
     found |= {f"scene.{path}": str(formula.__doc__) for path, formula in formulas.items() if formula is not None}
     for path, value in scene.values.items():
         if path not in axes.columns:
