@@ -48,6 +48,7 @@ class Kind:
     parts : tuple of str
         Optional parameters that the scenes give.
     impact : bool
+        On a belt: whether it has stops.
     solver, record : str or mapping
     span : tuple of float
         Least and greatest span, s.
@@ -86,7 +87,7 @@ class Kind:
             found["force"] = {"time": _TIMES.tolist(), "force": (4.0 * _COURSE).tolist()}
         if self.arcs:
             found |= {"zone": {}} if self.arcs == 1 else {"zones": [{} for _ in range(self.arcs)]}
-        return found | ({"impact": {}} if self.impact else {})
+        return found | ({"stops" if self.model == "belt" else "impact": {}} if self.impact else {})
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -108,6 +109,7 @@ class Kind:
         given = {*self.parts, *(f"force.{name}" for name in of_force)}
         given |= {"ring.radius"} if self.model == "ring" else set()
         given |= {"initial.velocity"} if self.model == "belt" else set()
+        given |= {"stops.low", "stops.high"} if self.model == "belt" and self.impact else set()
         given |= {"belt.velocity"} if self.model == "belt" and self.drive == "none" else set()
         return {path: p for path, p in parameters(structure).items() if not p.optional or path in given}
 
@@ -189,6 +191,7 @@ MAGNITUDES: dict[str, tuple[float, float]] = {
     r"elastic_fraction": (0.3, 0.95),
     r"seed": (1.0, 1.0),
     r"restitution": (0.1, 0.95),
+    r"stops.(low|high)": (0.03, 1.0),
     r"shift": (0.01, 1.0),
 }
 
@@ -238,6 +241,10 @@ def random_scenes(kind: Kind, count: int, rng: np.random.Generator) -> Run:
         numbers["friction.viscous"] = np.minimum(
             numbers["friction.viscous"], 0.9 * drop / numbers["friction.dead_band"]
         )
+    if "stops.low" in numbers:
+        low, high = (abs(numbers[f"stops.{name}"]) for name in ("low", "high"))
+        numbers["stops.low"], numbers["stops.high"] = -low, high
+        numbers["initial.x"] = np.clip(numbers["initial.x"], -low, high)
     # Half of the bodies that are launched at rest in space are launched at rest on the belt or ring.
     if kind.model == "belt" and "belt.velocity" in numbers:
         numbers["initial.velocity"] = np.where(
@@ -295,7 +302,7 @@ def _with_tables(run: Run, change: Callable[[str, np.ndarray], np.ndarray]) -> d
 PARITY = {
     r"belt.(velocity|incline)|initial.(x|velocity|deflection|phi|omega)": -1,
     r"center|(drive|force).(amplitude|constant)": -1,
-    r"body.normal_stiffness": -1,
+    r"body.normal_stiffness|stops.(low|high)": -1,
     r"spring.cubic|phase|body.center_offset|shift|frequency": 1,
 }
 
@@ -317,7 +324,8 @@ def parity(path: str, parameter: Parameter) -> int:
 
 def mirrored(run: Run) -> Run:
     """The mirror image of cells: forwards and backwards are exchanged."""
-    numbers = {path: parity(path, p) * run.numbers[path] for path, p in run.kind.parameters.items()}
+    other = {"stops.low": "stops.high", "stops.high": "stops.low"}
+    numbers = {path: parity(path, p) * run.numbers[other.get(path, path)] for path, p in run.kind.parameters.items()}
     for path in run.kind.two_way:
         numbers[f"{path}.forward"], numbers[f"{path}.backward"] = (
             numbers[f"{path}.backward"],

@@ -148,7 +148,8 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
     if "drive" in scene:
         names = dict.fromkeys([*DRIVES, own.FORMULA])
         drive = choose(names, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
-    impact = model in WITH_IMPACT and ("impact" in scene or any(str(path).startswith("impact.") for path in swept))
+    section = "stops" if model == "belt" else "impact"
+    impact = model in WITH_IMPACT and (section in scene or any(str(path).startswith(f"{section}.") for path in swept))
     found = Structure(model, "", drive, own_drive=own.drive_type(model, scene.get("drive", {})), impact=impact)
     if not _takes_force(model):
         return found

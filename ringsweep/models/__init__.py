@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ringsweep.compile import lacking
-from ringsweep.models.belt import Belt
+from ringsweep.models.belt import Belt, StopBelt
 from ringsweep.models.model import Model
 from ringsweep.models.ring import Ring, RingImpact, SingleContactImpact, SingleContactRing
 from ringsweep.models.scene import Structure, Values
@@ -18,8 +18,12 @@ __all__ = ["MODELS", "WITH_IMPACT", "Model", "Structure", "Values", "add_model",
 #: Models, by their names in configurations.
 MODELS: dict[str, Model] = {}
 
-#: Models of scenes with the section ``impact``, by the same names.
-WITH_IMPACT: dict[str, Model] = {"ring": RingImpact(), "ring-single-contact": SingleContactImpact()}
+#: Models of scenes with the section ``impact``, or ``stops`` on a belt, by the same names.
+WITH_IMPACT: dict[str, Model] = {
+    "ring": RingImpact(),
+    "ring-single-contact": SingleContactImpact(),
+    "belt": StopBelt(),
+}
 
 
 def add_model(model: Model) -> None:

@@ -70,7 +70,7 @@ class Structure:
     own_drive, own_force : type, optional
         Types of the drive and of the force on the body if the configuration defines them by formulas.
     impact : bool
-        Whether a run goes on after a contact is lost.
+        Whether a run goes on after a contact is lost, or a belt has stops.
     steady : bool
         Whether the body is launched at steady slip, see :mod:`ringsweep.models.belt.model`.
     exponent : bool

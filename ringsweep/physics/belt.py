@@ -99,6 +99,8 @@ class Belt(NamedTuple):
         Which states of the run are kept; an empty tuple for none.
     initial_z : float
         Deflection of the bristles at t = 0, m; an empty tuple without bristles.
+    stops : Stops
+        An empty tuple without stops.
     """
 
     body: Any
@@ -117,7 +119,31 @@ class Belt(NamedTuple):
     asked: Any = ()
     section: Any = ()
     initial_z: Any = ()
+    stops: Any = ()
 
 
 class BristleBelt(Belt):
     """Belt with a friction law of bristles: their deflection is a third state variable. It has no viscous friction."""
+
+
+class StopBelt(Belt):
+    """Belt with end stops for the body, and a friction law of the velocity."""
+
+
+class Stops(NamedTuple):
+    """End stops at rest in space.
+
+    Attributes
+    ----------
+    low, high : float
+        Places of the stops, m; beyond all places if there is none.
+    restitution : float
+        Coefficient of restitution, 1.
+    free : Belt
+        The same cells without stops.
+    """
+
+    low: Leaf
+    high: Leaf
+    restitution: Leaf
+    free: Any

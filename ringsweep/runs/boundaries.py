@@ -245,14 +245,16 @@ def check_word(word: object, scene: Scene, varied: Collection[str] = ()) -> None
     known = model_of(scene.structure).regimes({*varied, *scene.values})
     if "long_run" in model_of(scene.structure).columns(scene.structure) and word in LONG_RUNS:
         return
+    may_go_on = model in WITH_IMPACT and "aftermath" in WITH_IMPACT[model].outcomes
+    goes_on = may_go_on and scene.structure.impact
     if word not in REGIMES + AFTERMATHS:
-        words = known + AFTERMATHS if scene.structure.impact else known
+        words = known + AFTERMATHS if goes_on else known
         raise InputError("regime", f"{show(word)} is not a regime" + suggestion(word, words))
-    if word in known or (word in AFTERMATHS and scene.structure.impact):
+    if word in known or (word in AFTERMATHS and goes_on):
         return
-    if word in AFTERMATHS and model in WITH_IMPACT:
+    if word in AFTERMATHS and may_go_on:
         raise InputError("regime", f"{show(word)} is said of runs that go on: it needs impact in the scene")
-    also = f", with impact also {', '.join(AFTERMATHS)}" if scene.structure.impact or model in WITH_IMPACT else ""
+    also = f", with impact also {', '.join(AFTERMATHS)}" if may_go_on else ""
     raise InputError(
         "regime", f"no run of this scene can be {show(word)}: those of model {model} are {', '.join(known)}{also}"
     )

@@ -68,11 +68,12 @@ class Method(ABC):
             If the method does not take the law; if the model lacks a function that it needs; or if the file of law,
             drive, model or method is not known to the cache of compiled code.
         """
+        section = "stops" if structure.model == "belt" else "impact"
         if structure.impact and family_of(structure.law_type) is Dynamic:
             raise InputError(
-                "scene.impact",
+                f"scene.{section}",
                 f"friction law {structure.law} has bristles, which have no state in an impact: "
-                "choose a law without bristles, or leave impact out",
+                f"choose a law without bristles, or leave {section} out",
             )
         asked = [name for name in ("exponent", "section") if getattr(structure, name)]
         if asked and TRAITS[structure.law_type].snaps:
@@ -81,7 +82,11 @@ class Method(ABC):
                 f"friction law {structure.law} has none: its bonds form anew at random; choose another law, or leave "
                 f"record.{asked[0]} out",
             )
-        if asked and structure.impact:
+        if structure.model == "belt":
+            if structure.impact and structure.exponent:
+                problem = "cannot stand beside scene.stops: it takes no impacts; leave one of them out"
+                raise InputError("record.exponent", problem)
+        elif asked and structure.impact:
             raise InputError(
                 f"record.{asked[0]}",
                 "cannot stand beside scene.impact: the number of state variables changes from mode to mode; leave one "

@@ -88,7 +88,12 @@ class RK4(Method):
                 TRAITS[structure.law_type].snaps,
                 f"does not take friction law {structure.law}: its bonds snap; auto takes it",
             ),
-            (structure.impact, "does not go on after a contact is lost: auto does; or leave scene.impact out"),
+            (
+                structure.impact,
+                "does not rebound from stops: auto does; or leave scene.stops out"
+                if structure.model == "belt"
+                else "does not go on after a contact is lost: auto does; or leave scene.impact out",
+            ),
             (structure.exponent, "locates no events, at which disturbances jump: auto gives record.exponent"),
             (structure.section, "locates no instants for record.section: auto does"),
         ):

@@ -386,6 +386,56 @@ def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.floa
     return mu_s * values["body.mass"] * values["gravity"] / values["friction.sigma0"]
 
 
+class StopBelt(Belt):
+    """A mass on a spring on a moving belt, between end stops."""
+
+    outcomes: ClassVar[tuple[str, ...]] = (*Outcome._fields, "impacts", "impact_speed_max")
+
+    def scene_type(self, structure: Structure) -> type:
+        """``StopBelt``; without stops that of the belt."""
+        return belt.StopBelt if structure.impact else super().scene_type(structure)
+
+    def parameters(self, structure: Structure) -> dict[str, Parameter]:
+        """Parameters of a scene of this structure, by path."""
+        return super().parameters(structure) | {
+            "stops.low": Parameter("m", "place of the lower stop (default: none)", optional=True),
+            "stops.high": Parameter("m", "place of the upper stop (default: none)", optional=True),
+            "stops.restitution": Parameter("1", "coefficient of restitution of the stops", lower=0.0, upper=1.0),
+        }
+
+    def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
+        """State at the end of other runs; stops that have moved take the body along."""
+        found, (low, high) = super().continued(structure, values, ended), _stops(values)
+        return found | {"initial.x": np.clip(found["initial.x"], low, high)}
+
+    def build(self, structure: Structure, values: Values) -> belt.Belt:
+        """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
+        if friction.TRAITS[structure.law_type].dead_band:
+            raise InputError(
+                "scene.stops", f"cannot stand beside the dead band of law {structure.law}: leave stops out"
+            )
+        if "stops.low" not in values and "stops.high" not in values:
+            raise InputError("scene.stops", "low or high is missing: give one of them or both, such as `high: 2 cm`")
+        free = super().build(replace(structure, impact=False), values)
+        (low, high), x, where = _stops(values), free.initial_x, "initial.steady" if structure.steady else "initial.x"
+        require(low < high, "stops.low", low, "{} m is not below stops.high")
+        require(x >= low, where, x, "{} m is below stops.low: the body must start between the stops")
+        require(x <= high, where, x, "{} m is above stops.high: the body must start between the stops")
+        # Rebounds happen at one place, without a spring too.
+        free = free._replace(place_counts=np.ones(len(low)))
+        return belt.StopBelt(*free)._replace(stops=belt.Stops(low, high, values["stops.restitution"], free))
+
+
+# Where no stop is.
+_NOWHERE = 1e300
+
+
+def _stops(values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places of both stops, m."""
+    nowhere = np.full(len(values["time.span"]), _NOWHERE)
+    return values.get("stops.low", -nowhere), values.get("stops.high", nowhere)
+
+
 #: Words of the drives of a ring, and those of a belt, which moves along a line.
 _ON_A_LINE = {
     "rad": "m",

@@ -22,6 +22,7 @@ from ringsweep.models.interface.status import BROKEN, COMPLETE, SEPARATED_1
 from ringsweep.models.turn import Interval, between, turn_within
 from ringsweep.numerics.functions import any_of, lanes_body, negated, select, square_root
 from ringsweep.numerics.memory import select_all
+from ringsweep.numerics.terms import joined
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import largest_force
@@ -127,6 +128,28 @@ class Stops(NamedTuple):
     first_slip: Any
 
 
+class AtStop(NamedTuple):
+    """A body between end stops.
+
+    Attributes
+    ----------
+    rests : int
+        1 or -1 while the body rests at the upper or lower stop, else 0.
+    impacts, speed_max : float
+        Number of impacts up to now, and largest speed before one, m/s.
+    velocity : float
+        Velocity in space after the last impact, m/s.
+    lasts : float
+        Time from that impact until rebounds that are summed end, s.
+    """
+
+    rests: int
+    impacts: float
+    speed_max: float
+    velocity: float
+    lasts: float
+
+
 class Record(NamedTuple):
     """Record of a run on the belt; lengths in m, velocities in m/s, times in s, forces in N.
 
@@ -147,6 +170,8 @@ class Record(NamedTuple):
         Growth of small disturbances; an empty tuple if no exponent is asked for.
     section : Points
         Points of the section; an empty tuple if none is asked for.
+    at_stop : AtStop
+        An empty tuple without stops.
     """
 
     band: Any
@@ -161,10 +186,15 @@ class Record(NamedTuple):
     shocks: Any
     tangent: Any
     section: Any
+    at_stop: Any
 
 
 #: Record with another tangent.
 with_tangent = replacing("tangent")
+#: Record of a body that is elsewhere between its stops.
+with_stop = replacing("at_stop", "stops")
+#: Stops of which the present one began at another time.
+with_since = replacing("since")
 _entered, _with_section, _with_shocks = replacing("force_max", "shocks"), replacing("section"), replacing("shocks")
 _with_extremes, _with_half = replacing("low", "high"), replacing("next", "half_t", "half_x")
 
@@ -220,7 +250,50 @@ def record_at_launch(scene, t, seen, band, play):
         shock.at_launch(acceleration),
         tangent.undisturbed(scene.asked, scene, t),
         (),
+        _no_impact(scene.stops),
     )
+
+
+@feature("()")
+def _no_impact(stops):
+    """At the beginning of a run there has been no impact."""
+    return AtStop(0, 0.0, 0.0, 0.0, 0.0)
+
+
+@feature("0.0", absorb=True)
+def _turning(at_stop, now):
+    """Velocity at a turn, m/s, that tells turns at one place apart: a stop is where the body rebounds."""
+    return now.velocity if now.duration == 0.0 else 0.0
+
+
+@feature("fast", absorb=True)
+def _fastest(at_stop, fast, velocity):
+    """Velocity, m/s, that counts as much as a swing: `fast`, or that of a rebound."""
+    return max(fast, abs(velocity))
+
+
+@feature("False")
+def _stays(at_stop, belt_velocity):
+    """Whether a body rests at a stop, under which the belt slides along."""
+    return at_stop.rests != 0 and belt_velocity != 0.0
+
+
+@feature("velocity")
+def _at_end(at_stop, velocity):
+    """Velocity in space at the end of a run, m/s, which is exactly zero at a stop."""
+    return 0.0 if at_stop.rests != 0 else velocity
+
+
+@feature("False")
+def _ends_at_stop(at_stop):
+    """Whether a body that slides at a constant velocity cannot go on for ever."""
+    return True
+
+
+@feature("outcome")
+def _with_impacts(at_stop, outcome):
+    """Outcomes, and those of impacts."""
+    return joined(outcome, (at_stop.impacts, at_stop.speed_max))
 
 
 @recorder.lend.implements(Belt, BristleBelt)
@@ -271,6 +344,7 @@ def _observe_on_belt(scene, record, t, duration, stuck, seen):
         shock.without_event(r.shocks, acceleration),
         tangent.observed(r.tangent, scene, r.cycles, cycles_now, t, duration),
         section.with_point(scene.section, scene, r, cycles_now, now, (deflection,), _least_turn(r, r.x_max - r.x_min)),
+        r.at_stop,
     )
 
 
@@ -397,12 +471,12 @@ def _cycles(scene, r, stops, now, v, turn, span):
         x_due = between(last, now, share)
         t_mark = select(due, count * period, turn.t)
         x_mark = select(due, x_due, turn.x)
-        v_mark = select(due, (1.0 - share) * last.velocity + share * now.velocity, 0.0)
+        v_mark = select(due, (1.0 - share) * last.velocity + share * now.velocity, _turning(r.at_stop, now))
         low, high = select(ended, min(low, x_mark), low), select(ended, max(high, x_mark), high)
         swing = high - low
         stop = select(stops.slip_from == stops.slip_from, min(stops.slip_start, t_mark), t_mark) - stops.start
         total = stops.total + select(stop > abs(stops.least), stop, 0.0)
-        fast = swing * (2.0 * pi) / _pace(scene)
+        fast = _fastest(r.at_stop, swing * (2.0 * pi) / _pace(scene), v_mark)
         mark = Mark(t_mark, x_mark, v_mark, total, stops.slips)
         # Without forcing the launch is not the end of a cycle.
         new = cycles.closed(scene, c, mark, count, due | (c.count > 0.0), swing, fast, period)
@@ -413,7 +487,7 @@ def _cycles(scene, r, stops, now, v, turn, span):
 @recorder.conclude.implements(Belt, BristleBelt)
 def _conclude_on_belt(scene, record, status, t, place, velocity):
     """Implement :func:`recorder.conclude`: the numbers of :class:`Outcome`, and what the scene asks for besides."""
-    r, x = record, place
+    r, x, velocity = record, place, _at_end(record.at_stop, velocity)
     if holds_in_band(scene.law) and r.band > 0.0:
         # The state holds the momentum, which moves nothing in a dead band.
         velocity = r.last.velocity
@@ -445,14 +519,15 @@ def _conclude_on_belt(scene, record, status, t, place, velocity):
         r.force_max,
         *shock.largest_jump(r.shocks),
     )
-    return tangent.with_exponent(r.tangent, outcome, period, scene)
+    return _with_impacts(r.at_stop, tangent.with_exponent(r.tangent, outcome, period, scene))
 
 
 @inlined
 def _settles_to(scene, r, t):
     """Words for the motion and for what it settles to, period, share of stick and stops in a cycle, mean velocity."""
     c, forced, repeats = r.cycles, scene.cycle < inf, scene.forcing_period < inf
-    fast, growth = c.swing * (2.0 * pi) / _pace(scene), tangent.exponent(r.tangent)
+    fast = _fastest(r.at_stop, c.swing * (2.0 * pi) / _pace(scene), c.reference.velocity)
+    growth = tangent.exponent(r.tangent)
     returns = (repeats or not forced) and cycles.returns_each_time(
         scene, c, forced, fast, tangent.largest_multiplier(r.tangent), growth
     )
@@ -519,6 +594,8 @@ def _words(scene, r, t, of):
     if not forced and in_stop and rests and belt_velocity != 0.0:
         # The belt slides along under a body at rest, below the speed at which its friction no longer grows.
         return SLIDING, still, nan, 0.0, 0.0
+    if not forced and _stays(r.at_stop, belt_velocity):
+        return SLIDING, still, nan, 0.0, 0.0
     if in_stop and (for_good or stops.least < 0.0):
         motion = RIDING if stops.least < 0.0 else STICKING
         return motion, held if for_good else TRANSIENT, c.period if for_good and repeats else nan, 1.0, 0.0
@@ -528,7 +605,7 @@ def _words(scene, r, t, of):
         # There is no cycle, or none any more.
         if in_stop or (stops.slips > 0.0 and slips_since < natural):
             return STICK_SLIP, TRANSIENT, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan
-        if natural < inf:
+        if natural < inf or _ends_at_stop(r.at_stop):
             far = max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
             steady = abs(r.last.velocity) * min(natural, scene.span) <= max(RETURN * far, _UNRESOLVED * abs(r.last.x))
         else:

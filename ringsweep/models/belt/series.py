@@ -102,7 +102,7 @@ def _begin_on_belt(scene):
     if ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
         status, mode = SEPARATED_1, Mode(0, KINETIC, -1)
     elif holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
-        mode = _mode_at_rest(scene, Instant(t, 0.0), x)
+        mode = mode_at_rest(scene, Instant(t, 0.0), x)
     elif v == 0.0:
         pull = stuck_pull(scene, x, v, drives.turn(scene.drive, t))
         mode = Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
@@ -110,7 +110,7 @@ def _begin_on_belt(scene):
 
 
 @inlined
-def _mode_at_rest(scene, t, x):
+def mode_at_rest(scene, t, x):
     """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
     forcing = drives.turn(scene.drive, t)
     pull = stuck_pull(scene, x, 0.0, forcing)
@@ -150,14 +150,14 @@ def _switch_on_belt(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, region + 1, SLOW), (x, sign * high)
     if low > 0.0:
         if holds_in_band(scene.law) and region - 1 < 0:
-            return RUNNING, _mode_at_rest(scene, t, x), (x, sign * low)
+            return RUNNING, mode_at_rest(scene, t, x), (x, sign * low)
         return RUNNING, Mode(sign, region - 1, FAST), (x, sign * low)
     if holds_in_band(scene.law) and region < 0:
         # The pull has fallen to the breakaway force.
         return RUNNING, Mode(0, KINETIC, -1), y
     if region < 0:
         return RUNNING, Mode(-sign, region, SLOW), (x, 0.0)
-    return RUNNING, _mode_at_rest(scene, t, x), (x, 0.0)
+    return RUNNING, mode_at_rest(scene, t, x), (x, 0.0)
 
 
 @feature("0.0", of=ring.having(belt.OnBelt, "cubic"))
@@ -226,7 +226,7 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
             c[SLOW, 0] += least
             c[FAST, 0] += least
     else:
-        sharpness = _expand_slip(scene, mode, if_force(body, scene.viscous, 0.0), c)
+        sharpness = expand_slip(scene, mode, if_force(body, scene.viscous, 0.0), c, False)
         expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), 0.0)
         if _has_dead_band(scene) and mode.entry_guard == SLOW:
             # A body whose momentum is that of the edge leaves the band as the pull reaches the breakaway force.
@@ -270,8 +270,10 @@ def _from_no_load(c, sticks):
 
 
 @inlined
-def _expand_slip(scene, mode, viscous, c):
+def expand_slip(scene, mode, viscous, c, held):
     """Fill the series of slip and return the sharpness of the friction law.
+
+    If the body is `held` at rest, the acceleration is that which the hold prevents.
 
     Each coefficient is computed from numbers that are still in registers; the table only keeps it.
     """
@@ -287,7 +289,7 @@ def _expand_slip(scene, mode, viscous, c):
     of_law = no_products(scene.law, surfaces)
     first = newest = no_factors(of_law)
     for k in range(1, ORDER + 1):
-        x, velocity = velocity * INVERSE[k], acceleration * INVERSE[k]
+        x, velocity = velocity * INVERSE[k], 0.0 if held else acceleration * INVERSE[k]
         v = velocity - (k + 1.0) * c[SHIFT, k + 1]
         c[X, k] = x
         inner = part_from(inner_products(c, FACTORS, k, first, newest), of_law, ())

@@ -1,0 +1,183 @@
+"""End stops of a belt: impacts, rebounds that are summed, and rest at a stop, against closed forms."""
+
+from math import atan, log, pi, sqrt
+
+import numpy as np
+import pytest
+from belts import on_belt, outcome, with_all_parts
+from tiers import mostly_slow
+
+import ringsweep
+
+G = 9.81
+
+
+def between(low=None, high=None, e=0.5, *, mu_k=0.0, mu_s=None, law="stiction", constant=0.0, **belt):
+    """A belt of one kind with stops, whose kernel all tests of a law share."""
+    places = {"low": low, "high": high}
+    stops = {"restitution": e} | {name: place for name, place in places.items() if place is not None}
+    friction = {"law": law, "mu_k": mu_k} | ({"mu_s": mu_s or mu_k} if law == "stiction" else {"v0": 1e-3})
+    scene = with_all_parts(on_belt(friction, **({"velocity": 0.5} | belt)))
+    return scene | {"stops": stops, "force": scene["force"] | {"constant": constant}}
+
+
+def states(scene, times):
+    """Outcomes of runs of a scene that end at these times."""
+    return ringsweep.sweep(scene, {"time.span": times}, progress=False)
+
+
+class TestClosedForms:
+    """Motions that are known piece by piece."""
+
+    def test_without_friction_each_rebound_takes_1_over_e_of_the_time_before(self):
+        e, length = 0.8, 3.0
+        scene = between(-1.0, 2.0, e, stiffness=0.0, start=(0.0, 1.0))
+        hits = 2.0 + length * np.cumsum(e ** -np.arange(1.0, 12.0))
+        found = states(scene, 0.5 * (hits[1:] + hits[:-1]))
+        numbers = np.arange(2.0, 12.0)
+        np.testing.assert_array_equal(found.impacts, numbers)
+        np.testing.assert_allclose(found.velocity_end, (-e) ** numbers, rtol=1e-12)
+        np.testing.assert_allclose(found.x_end, 0.5, atol=1e-11)
+        assert (found.certified == 1).all()
+
+    def test_a_motion_between_stops_that_lose_nothing_returns_each_time(self):
+        found = outcome(between(-1.0, 2.0, 1.0, stiffness=0.0, start=(0.0, 1.0), span=100.0))
+        assert found.regime.attrs["flag_meanings"].split()[int(found.regime)] == "oscillatory"
+        assert found.period.item() == pytest.approx(6.0, rel=1e-12)
+        assert found.settled == 1
+        # Each impact is as fast as the one before but for 1 %.
+        assert outcome(between(-1.0, 2.0, 0.99, stiffness=0.0, start=(0.0, 1.0), span=100.0)).settled == 0
+
+    def test_a_spring_presses_rebounds_to_rest_in_the_sum_of_their_times(self):
+        """Away from a stop at -s the body swings about the rest position of the spring, beyond the stop."""
+        e, s, stiffness, u = 0.6, 0.3, 4.0, 0.5
+        omega, speeds = sqrt(stiffness), u * 0.6 ** np.arange(12.0)
+        # It is launched from the stop.
+        hits = np.cumsum([2.0 / omega * atan(speed / (omega * s)) for speed in speeds])
+        found = states(between(high=-s, e=e, stiffness=stiffness, start=(-s, -u)), 0.5 * (hits[1:] + hits[:-1]))
+        np.testing.assert_array_equal(found.impacts, np.arange(1.0, 12.0))
+        np.testing.assert_allclose(found.velocity_end, 0.0, atol=1e-9)
+        lowest = -np.sqrt(s * s + (speeds[1:] / omega) ** 2)
+        np.testing.assert_allclose(found.x_end, lowest, rtol=1e-12)
+        rests = outcome(between(high=-s, e=e, stiffness=stiffness, start=(-s, -u), span=20.0))
+        assert (rests.x_end, rests.velocity_end, rests.settled, rests.certified) == (-s, 0.0, 1, 1)
+        # Rebounds are summed that move the body by less than a share of 1e-13.
+        assert 0.4 * log(1e-13) / log(e) < rests.impacts < 0.6 * log(1e-13) / log(e)
+
+    def test_on_a_belt_at_rest_friction_shortens_each_rebound_twice(self):
+        e, mu, pull, u = 0.7, 0.1, 3.0, 2.0
+        away, back = pull + mu * G, pull - mu * G
+        ratio = sqrt(back / away)
+        end = u * (1.0 / away + ratio / back) / (1.0 - e * ratio)
+        scene = between(high=0.2, e=e, mu_k=mu, constant=pull, stiffness=0.0, velocity=0.0, start=(0.2, -u), span=6.0)
+        found = outcome(scene)
+        assert found.stick_time.item() == pytest.approx(6.0 - end, rel=1e-9)
+        assert found.x_min.item() == pytest.approx(0.2 - 0.5 * u * u / away, rel=1e-12)
+        assert (found.x_end, found.velocity_end, found.certified) == (0.2, 0.0, 1)
+
+    @pytest.mark.parametrize("side", [1, -1])
+    def test_a_body_at_a_stop_leaves_it_as_its_load_turns(self, side):
+        """The force a sin(w t) exceeds friction from 0; it falls below it at pi/w less the angle of friction."""
+        mu, a, w = 0.1, 4.0, 2.0 * pi * 0.1
+        scene = between(mu_k=mu, stiffness=0.0, velocity=side * 0.5, force=(side * a, 0.1), start=(side * 0.3, 0.0))
+        scene["stops"] = {"restitution": 0.5, ("high" if side > 0 else "low"): side * 0.3}
+        leaves = (pi + np.arcsin(mu * G / a)) / w
+        found = states(scene, [leaves - 1e-6, leaves + 1.0])
+        assert (found.x_end[0], found.velocity_end[0], found.impacts[0]) == (side * 0.3, 0.0, 0)
+        s = 1.0
+        load, angle = mu * G, w * leaves
+        gained = load * s - a / w * (np.cos(angle + w * s) - np.cos(angle))
+        assert found.velocity_end[1].item() == pytest.approx(side * gained, rel=1e-9)
+
+    def test_a_stop_without_restitution_stops_the_body_at_once(self):
+        found = outcome(between(high=0.1, e=0.0, mu_k=0.1, stiffness=1.0, start=(0.0, 0.8), span=9.0))
+        assert (found.impacts, found.x_end, found.velocity_end) == (1, 0.1, 0.0)
+        assert found.regime.attrs["flag_meanings"].split()[int(found.regime)] == "sliding"
+
+    @pytest.mark.parametrize("law", mostly_slow(["stiction", "threlfall"], ["stiction"]))
+    def test_a_belt_that_slips_under_a_body_at_a_stop_slides_steadily(self, law):
+        scene = between(high=0.2, e=0.5, mu_k=0.1, law=law, stiffness=1.0, start=(0.0, 1.0), span=30.0)
+        found = outcome(scene)
+        assert found.regime.attrs["flag_meanings"].split()[int(found.regime)] == "sliding"
+        assert (found.x_end, found.velocity_end, found.settled, found.certified) == (0.2, 0.0, 1, 1)
+        assert found.force_max == pytest.approx(0.1 * G, rel=1e-6)
+
+
+def by_parabolas(x, u, belt, friction, low, high, e, span):
+    """Place, velocity and impacts of a body without a spring on a moving belt: its pieces are parabolas."""
+    t, hits, sticks = 0.0, 0, u == belt
+    while True:
+        a = 0.0 if sticks else friction * np.sign(belt - u)
+        events = [(span - t, "end")] + ([] if sticks else [((belt - u) / a, "stick")])
+        for place in (low, high):
+            roots = np.roots([0.5 * a, u, x - place]) if a else np.array([(place - x) / u])
+            later = [r.real for r in roots if abs(r.imag) < 1e-12 and r.real > 1e-9]
+            events += [(r, "stop") for r in later]
+        s, what = min(events)
+        t, x, u = t + s, x + s * (u + 0.5 * a * s), u + a * s
+        if what == "end":
+            return x, u, hits
+        if what == "stop":
+            u, hits, sticks = -e * u, hits + 1, False
+        else:
+            u, sticks = belt, True
+
+
+def test_random_bodies_between_stops_move_along_parabolas():
+    rng, cells = np.random.default_rng(53), 60
+    axes = {
+        "initial.x": rng.uniform(-0.2, 0.2, cells),
+        "initial.velocity": rng.uniform(-4.0, 4.0, cells),
+        "belt.velocity": rng.uniform(0.3, 1.0, cells) * rng.choice([-1.0, 1.0], cells),
+        "friction.mu_k": rng.uniform(0.02, 0.3, cells),
+        "stops.low": rng.uniform(-0.6, -0.2, cells),
+        "stops.high": rng.uniform(0.2, 0.6, cells),
+        "stops.restitution": rng.uniform(0.6, 1.0, cells),
+        "time.span": rng.uniform(0.1, 2.0, cells),
+    }
+    points = {path: column.tolist() for path, column in axes.items()} | {"friction.mu_s": [0.3] * cells}
+    config = {"scene": between(-1.0, 1.0, stiffness=0.0, mu_k=0.1, span=1.0), "sweep": {"points": points}}
+    found = ringsweep.run(config, progress=False)
+    mirror = {
+        "stops.low": (-axes["stops.high"]).tolist(),
+        "stops.high": (-axes["stops.low"]).tolist(),
+        **{path: (-axes[path]).tolist() for path in ("initial.x", "initial.velocity", "belt.velocity")},
+    }
+    config["sweep"] = {"points": points | mirror}
+    other = ringsweep.run(config, progress=False)
+    own = np.array(
+        [
+            by_parabolas(x, u, belt, G * mu, low, high, e, span)
+            for x, u, belt, mu, low, high, e, span in zip(*axes.values(), strict=True)
+        ]
+    )
+    assert own[:, 2].max() > 4
+    np.testing.assert_array_equal(found.impacts, own[:, 2])
+    np.testing.assert_allclose(np.array([found.x_end, found.velocity_end]).T, own[:, :2], atol=1e-10)
+    np.testing.assert_array_equal(-other.x_end, found.x_end)
+    np.testing.assert_array_equal(-other.x_min, found.x_max)
+
+
+class TestMistakes:
+    """Scenes that cannot be run are refused with the path and the cause."""
+
+    @pytest.mark.parametrize(
+        ("change", "options", "path", "cause"),
+        [
+            ({"stops": {"restitution": 0.5}}, {}, "scene.stops", "low or high is missing"),
+            ({"stops": {"low": 0.3, "high": 0.1, "restitution": 0.5}}, {}, "scene.stops.low", "not below stops.high"),
+            ({"stops": {"high": -0.1, "restitution": 0.5}}, {}, "scene.initial.x", "0 m is above stops.high"),
+            ({"stops": {"high": 0.1}}, {}, "scene.stops.restitution", "missing"),
+            ({"stops": {"high": 0.1, "restitution": 1.5}}, {}, "scene.stops.restitution", "1.5"),
+            ({}, {"solver": {"method": "rk4", "steps": 100}}, "solver.method", "does not rebound from stops"),
+            ({}, {"record": {"exponent": True}}, "record.exponent", "scene.stops"),
+            ({"friction": {"law": "karnopp", "mu_s": 0.2, "mu_k": 0.1, "dead_band": 1e-3}}, {}, "scene.stops", "dead"),
+            ({"friction": {"law": "dahl", "mu_k": 0.2, "sigma0": 1e4}}, {}, "scene.stops", "bristles"),
+        ],
+    )
+    def test_the_message_says_where_and_why(self, change, options, path, cause):
+        scene = between(-1.0, 1.0, mu_k=0.1, span=1.0) | change
+        with pytest.raises(ringsweep.InputError) as refused:
+            ringsweep.sweep(scene, {"time.span": [1.0]}, **options)
+        assert str(refused.value).startswith(path)
+        assert cause in str(refused.value)
