@@ -27,6 +27,9 @@ INSTANTS = 4
 # Matrix that turns the values at the ends of these parts into the coefficients of a polynomial.
 _INTERPOLATION = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1.0, INSTANTS + 1), increasing=True)))
 
+# Error of the instant of an event, as a share of the step that shows it, in units of the tolerance.
+_EVENT_ERROR = 1e-3
+
 # Factor by which the relative error of the acceleration on bristles may exceed the relative error of the state.
 _ACCELERATION_FACTOR = 100.0
 
@@ -111,11 +114,13 @@ def _guard_after(scene, start, scratch, h, g):
 
 
 @inlined
-def _locate(scene, start, scratch, h, ends, g):
+def _locate(scene, start, scratch, h, ends, g, guess, precision):
     """Length of the step after which guard `g` is zero.
 
     `ends` are the values of the guard before the step and after a step of length `h`; the second one is not positive.
-    Each value of the guard comes from a step of the method, not from dense output.
+    `guess` is the length of the step by the dense output, or zero if it does not tell. `precision` is the error that
+    the length may have, as a share of `h`; after a step of the length found the guard is not positive. Each value of
+    the guard comes from a step of the method, not from dense output.
     """
     (f_low, f_high), low, high = ends, 0.0, h
     if f_low <= 0.0:
@@ -133,7 +138,7 @@ def _locate(scene, start, scratch, h, ends, g):
             return 0.0
     # Chandrupatla's method: a parabola through the last three points where it is safe, else bisection.
     near, f_near, far, f_far, before, f_before = high, f_high, low, f_low, high, f_high
-    share = f_near / (f_near - f_far)
+    share = (near - guess) / (near - far) if far < guess < near else f_near / (f_near - f_far)
     for _ in range(100):
         s = near + share * (far - near)
         f = _guard_after(scene, start, scratch, s, g)
@@ -143,7 +148,7 @@ def _locate(scene, start, scratch, h, ends, g):
             before, f_before, far, f_far = far, f_far, near, f_near
         near, f_near = s, f
         width = abs(far - near)
-        least = 0.5e-14 * h
+        least = 0.5 * precision * h
         if width <= 2.0 * least:
             break
         place, height = (near - far) / (before - far), (f_near - f_far) / (f_before - f_far)
@@ -181,7 +186,7 @@ def _may_vanish(near_zero, first, middle, last):
 
 
 @inlined
-def _first_event_by_samples(scene, start, scratch, taken, views):
+def _first_event_by_samples(scene, start, scratch, taken, views, precision):
     """First guard to fall below zero within an implicit step, and the length of the step up to it.
 
     If none does: -1, and the length of the whole step.
@@ -189,7 +194,7 @@ def _first_event_by_samples(scene, start, scratch, taken, views):
     A guard is taken as the polynomial through its values at five instants of the dense output, whose degree is four as
     well. Its first root is isolated like the root of a series, so that no dip between two instants is missed.
 
-    `views` are those at the beginning, in the middle and at the end of the step.
+    `views` are those at the beginning, in the middle and at the end of the step, `precision` that of :func:`_locate`.
     """
     (before, within, after), s = views, taken.h
     near_zero = implicit.near_zero(scene, within[1])
@@ -200,10 +205,11 @@ def _first_event_by_samples(scene, start, scratch, taken, views):
         if not _may_vanish(near_zero[g], before[0][g], within[0][g], after[0][g]):
             continue
         samples = before[0][g], early[0][g], within[0][g], late[0][g], after[0][g]
-        h_below = min(h_event, s * _fraction_below_zero(samples, scratch.work))
+        root, below = _root_and_below(samples, scratch.work)
+        h_below = min(h_event, s * below)
         if h_below == 0.0:
             continue
-        value_below = _guard_after(scene, start, scratch, h_below, g)
+        value_below = after[0][g] if h_below == s else _guard_after(scene, start, scratch, h_below, g)
         if value_below > 0.0 > after[0][g]:
             # The polynomial has cut a corner of the guard, which vanishes later.
             h_below, value_below = s, after[0][g]
@@ -211,7 +217,8 @@ def _first_event_by_samples(scene, start, scratch, taken, views):
         # at zero.
         if value_below > 0.0 or value_below == before[0][g] == 0.0:
             continue
-        found = _locate(scene, start, scratch, h_below, (before[0][g], value_below), g)
+        ends = before[0][g], value_below
+        found = _locate(scene, start, scratch, h_below, ends, g, s * root, precision)
         if event < 0 or found < h_event * (1.0 - 1e-12):
             event, h_event = g, found
     return event, h_event
@@ -228,22 +235,25 @@ def _interpolate(samples, row):
 
 
 @inlined
-def _fraction_below_zero(samples, work):
-    """Fraction of a step at which a guard is below zero after its first root; 0 if there is none.
+def _root_and_below(samples, work):
+    """Fractions of a step at the first root of a guard, and after it where the guard is below zero; zeros if none.
 
-    `samples` are the values of the guard. A guard may stay at zero: a body at rest in equilibrium does not move.
+    `samples` are the values of the guard. A guard may stay at zero: a body at rest in equilibrium does not move. If it
+    is zero at the beginning, the first fraction is zero.
     """
     if samples[0] <= 0.0:
         for i in range(1, INSTANTS + 1):
             if samples[i] < 0.0:
-                return i / INSTANTS
-        return 0.0
+                return 0.0, i / INSTANTS
+        return 0.0, 0.0
     row, roots = work[-1], work[0]
     _interpolate(samples, row)
     count = crossings(row, 1.0, work[:-1], 0)
+    if count == 0:
+        return 0.0, 0.0
     ascending(roots, count)
     # Between two roots the guard dips below zero.
-    return 0.0 if count == 0 else 1.0 if count == 1 else 0.5 * (roots[0] + roots[1])
+    return roots[0], 1.0 if count == 1 else 0.5 * (roots[0] + roots[1])
 
 
 # Largest factor by which the length of a step grows; and factor by which a run at the looser tolerance of a certificate
@@ -350,7 +360,8 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])
         if not near:
             break
-        event, h = _first_event_by_samples(scene, start, scratch, taken, (before, middle, after))
+        precision = max(1e-14, _EVENT_ERROR * tolerance)
+        event, h = _first_event_by_samples(scene, start, scratch, taken, (before, middle, after), precision)
         if event < 0 or h == 0.0:
             break
         near = False
