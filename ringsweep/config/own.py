@@ -190,8 +190,8 @@ def drive_type(model: str, drive: Mapping[str, Any]) -> type | None:
     return found
 
 
-def force_type(force: Any) -> type | None:
-    """Type of the force on the body if the section ``force`` has a ``formula``.
+def force_type(force: Any, section: str = "force") -> type | None:
+    """Type of the force on the body, or of its load, if their `section` has a ``formula``.
 
     Raises
     ------
@@ -200,10 +200,12 @@ def force_type(force: Any) -> type | None:
     """
     if not isinstance(force, Mapping) or "formula" not in force:
         return None
-    for key in TABLE_KEYS["force"]:
+    for key in TABLE_KEYS[section]:
         if key in force:
-            raise InputError(f"scene.force.{key}", "cannot stand beside a formula: give one of them")
-    return _defined(lambda: drives.define(force["formula"], "N"), {"mu": ("scene.force.formula", force["formula"])})
+            raise InputError(f"scene.{section}.{key}", "cannot stand beside a formula: give one of them")
+    return _defined(
+        lambda: drives.define(force["formula"], "N"), {"mu": (f"scene.{section}.formula", force["formula"])}
+    )
 
 
 def _law(definition: Definition, path: str) -> type:
@@ -229,6 +231,7 @@ TABLES = {
         "theta": Parameter("rad", "angle of the drive"),
     },
     "force": {"time": Parameter("s", "time in the table of the force"), "force": Parameter("N", "force on the body")},
+    "body.load": {"time": Parameter("s", "time in the table of the load"), "load": Parameter("N", "normal load")},
     "friction": {
         "v": Parameter("m/s", "sliding speed in the table of friction", lower=0.0),
         "mu": Parameter("1", "friction coefficient", lower=0.0),
@@ -247,6 +250,7 @@ INTERPOLATIONS = {
         "linear": "straight lines",
     },
 }
+INTERPOLATIONS["body.load"] = INTERPOLATIONS["force"]
 
 #: Keys of a section that stand for a table, by section.
 TABLE_KEYS = {of: (*columns, "file", *["interpolate"] * (of in INTERPOLATIONS)) for of, columns in TABLES.items()}
@@ -254,7 +258,7 @@ TABLE_KEYS = {of: (*columns, "file", *["interpolate"] * (of in INTERPOLATIONS)) 
 # Share of the range of a table that a spline through it may leave; a sine with six rows a period leaves less.
 _OVERSHOOT = 0.1
 
-_PLURAL = {"time": "times", "theta": "angles", "force": "forces", "v": "speeds", "mu": "coefficients"}
+_PLURAL = {"time": "times", "theta": "angles", "force": "forces", "load": "loads", "v": "speeds", "mu": "coefficients"}
 
 
 # Factor by which numbers of a table may grow before they overflow.

@@ -85,6 +85,8 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         moved = replace(moved, table=own.read_samples(doc, scene["drive"], "drive"))
     if any(f"force.{name}" in leaves for name in own.TABLE_KEYS["force"]):
         moved = replace(moved, force=own.read_samples(doc, scene["force"], "force"))
+    if any(f"body.load.{name}" in leaves for name in own.TABLE_KEYS["body.load"]):
+        moved = replace(moved, load=own.read_samples(doc, scene["body"]["load"], "body.load"))
     structures = {
         law: replace(moved, law=law, own_law=defined.get(law), curve=curve if law == own.TABLE_LAW else None)
         for law in names
@@ -156,6 +158,7 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
     return replace(
         found,
         own_force=own.force_type(scene.get("force")),
+        own_load=own.force_type(body.get("load"), "body.load") if isinstance(body := scene.get("body"), dict) else None,
         steady=_starts_steadily(scene, swept),
         two_way=_two_way(scene, swept),
     )
@@ -259,9 +262,10 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
     takes_force = _takes_force(model)
     by_formula = {"friction.mu": own.FORMULA in laws, "friction.at_rest": own.FORMULA in laws}
     by_formula |= dict.fromkeys(("drive.theta", "drive.velocity"), drive == own.FORMULA)
-    by_formula |= dict.fromkeys(("force.formula", "initial.steady"), takes_force)
+    by_formula |= dict.fromkeys(("force.formula", "body.load.formula", "initial.steady"), takes_force)
     yield from (path for path, is_used in by_formula.items() if is_used)
     by_table = {"drive": drive == "table", "force": takes_force, "friction": own.TABLE_LAW in laws}
+    by_table["body.load"] = takes_force
     yield from (f"{of}.{key}" for of, keys in own.TABLE_KEYS.items() if by_table[of] for key in keys)
 
 

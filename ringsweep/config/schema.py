@@ -56,6 +56,7 @@ def schema() -> dict[str, Any]:
             "initial.from": _text("result file of the run on the belt that goes on"),
             "initial.steady": _word("a motion to start from, in place of x and velocity", STEADY),
             "force.formula": _text("force on the body, N, as a formula of the time t, s"),
+            "body.load.formula": _text("normal load beside the weight, N, as a formula of the time t, s"),
             **tables,
             **{f"{of}.interpolate": _word("what joins the rows", joins) for of, joins in own.INTERPOLATIONS.items()},
             "friction.mu": _any(by_formula["mu"], tables["friction.mu"]),
@@ -69,6 +70,8 @@ def schema() -> dict[str, Any]:
     for section, what in {"friction": "friction law", "drive": "drive", "force": "force"}.items():
         own_parameter = Parameter("", f"parameter of a {what} by formula")
         scene["properties"][section]["additionalProperties"] = _number(own_parameter)
+    load = scene["properties"]["body"]["properties"]["load"]
+    load["additionalProperties"] = _number(Parameter("", "parameter of a load by formula"))
     record = _section(_keys(options.RECORD, section=_section(_keys(options.SECTION), "at")))
     sections = {
         "scene": scene,
@@ -175,7 +178,7 @@ def _solver() -> dict[str, Any]:
 def _sweep(paths: list[str]) -> dict[str, Any]:
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
     laws = _list(_laws("friction law"))
-    parameter = rf"^(friction|drive|force)\.[A-Za-z][A-Za-z0-9_]*(\.({'|'.join(WAYS)}))?$"
+    parameter = rf"^(friction|drive|force|body\.load)\.[A-Za-z][A-Za-z0-9_]*(\.({'|'.join(WAYS)}))?$"
     names = {"anyOf": [{"enum": [LAW, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": parameter}]}
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(axes.COUNT)], "minItems": 3, "maxItems": 3}

@@ -21,7 +21,7 @@ from ringsweep.models.slip import by_deflections, deflection_rates
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import contact, ring
-from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.belt import Belt, BristleBelt, laden
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_band
 from ringsweep.physics.ring import BristleRing, Ring
@@ -101,6 +101,7 @@ def _sliding_velocity(scene, y, forcing):
 def rates_in_space(scene, y, forcing, angle):
     """Time derivative of a state; the arguments are those of :func:`slip_in_space`."""
     now, _ = slip_in_space(scene, y, _sliding_velocity(scene, y, forcing), forcing, angle)
+    scene = laden(scene.drive, scene, forcing)
     acceleration = ring.acceleration(scene.body, *now.K, now.motion)[0]
     return joined((now.motion[2], acceleration), deflection_rates(now.bristles))
 
@@ -108,8 +109,10 @@ def rates_in_space(scene, y, forcing, angle):
 @absorbed
 def inspection(scene, y, place, forcing, angle):
     """The :class:`Inspection` of a state at a place; the other arguments are those of :func:`slip_in_space`."""
-    body, v = scene.body, _sliding_velocity(scene, y, forcing)
+    v = _sliding_velocity(scene, y, forcing)
     now, stuck = slip_in_space(scene, y, v, forcing, angle)
+    scene = laden(scene.drive, scene, forcing)
+    body = scene.body
     acceleration, determinant = ring.acceleration(body, *now.K, now.motion)
     normal_1, normal_2 = ring.reactions(body, *now.K, now.motion)
     slope = ring.radius(body) * ring.acceleration_slope(body, *now.K, *now.slopes, now.motion)

@@ -67,8 +67,10 @@ class Structure:
         Sliding speeds (m/s) and friction coefficients of a law from a table, each of shape ``(points,)``.
     force : tuple, optional
         Times (s) and forces (N) of a force from a table, each of shape ``(samples,)``, and its interpolation.
-    own_drive, own_force : type, optional
-        Types of the drive and of the force on the body if the configuration defines them by formulas.
+    load : tuple, optional
+        The same of a normal load from a table, N.
+    own_drive, own_force, own_load : type, optional
+        Types of the drive, of the force on the body and of its normal load if they are defined by formulas.
     impact : bool
         Whether a run goes on after a contact is lost, or a belt has stops.
     steady : bool
@@ -91,8 +93,10 @@ class Structure:
     own_law: type | None = None
     curve: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     force: tuple[NDArray[np.float64], NDArray[np.float64], str] | None = None
+    load: tuple[NDArray[np.float64], NDArray[np.float64], str] | None = None
     own_drive: type | None = None
     own_force: type | None = None
+    own_load: type | None = None
     impact: bool = False
     steady: bool = False
     exponent: bool = False

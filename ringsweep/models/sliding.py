@@ -18,7 +18,7 @@ from ringsweep.models.slip import acceleration_slopes, by_deflections
 from ringsweep.numerics.series import slope, value
 from ringsweep.numerics.terms import set_terms, terms
 from ringsweep.physics import contact, drives, ring
-from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.belt import Belt, BristleBelt, laden
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.physics.ring import BristleRing, Ring
 
@@ -170,6 +170,7 @@ def audited(scene, mode, forcing, y):
 def _violation_on_bristles(scene, mode, forcing, y, rates, s, tolerance):
     """Implement :func:`audit.violation` for laws with bristles; the rate of each deflection is checked too."""
     now, terms, largest = audited(scene, mode, forcing, y)
+    scene = laden(scene.drive, scene, forcing)
     body, v = scene.body, y[1]
     if not ring.acceleration(body, *now.K, now.motion)[1] > 0.0:
         largest = inf

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined, unrolled
+from ringsweep.compile import absorbed, feature, hook, inlined, unrolled
 from ringsweep.models.interface import implicit, variation
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import drives, ring
-from ringsweep.physics.belt import Belt, BristleBelt
-from ringsweep.physics.forces import force_rate
+from ringsweep.physics.belt import Belt, BristleBelt, laden, laden_at
+from ringsweep.physics.forces import Laden, force_rate, load_rate
 from ringsweep.physics.friction.presliding import bristle
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import region_bounds, stiction_band
@@ -141,19 +141,26 @@ def _rows_of_deflections(count, bristles):
 @implicit.rates.implements(Ring, BristleRing, Belt, BristleBelt)
 def _rates_in_slip(scene, mode, common, forcing, x):
     """Implement :func:`implicit.rates`: of the place, of the sliding velocity, and of the deflections."""
-    now = slip(scene, mode, common, forcing, x)
+    now, scene = slip(scene, mode, common, forcing, x), laden(scene.drive, scene, forcing)
     acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
     sliding = ring.radius(scene.body) * (acceleration - forcing[2])
     return joined((now.place_rate, sliding), deflection_rates(now.bristles))
 
 
+@feature("force_rate(drive, forcing)", of=Laden)
+def pulled(drive, now, forcing):
+    """Rate of the force and of friction under a load that varies in time, N/s."""
+    return force_rate(drive, forcing) + now.K[0] * load_rate(drive, 0.0, forcing)
+
+
 @implicit.linearise.implements(Ring, BristleRing, Belt, BristleBelt)
 def _linearise_slip(scene, mode, common, t, forcing, x):
     """Implement :func:`implicit.linearise`."""
-    now, radius = slip(scene, mode, common, forcing, x), ring.radius(scene.body)
+    now, scene = slip(scene, mode, common, forcing, x), laden(scene.drive, scene, forcing)
+    radius = ring.radius(scene.body)
     acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
     by_place, by_v, by_drive = acceleration_slopes(scene, now)
-    by_force = force_rate(scene.drive, forcing) / scene.body.mass
+    by_force = pulled(scene.drive, now, forcing) / scene.body.mass
     by_time = by_place * forcing[1] + by_drive * forcing[2] + by_force - radius * drives.jerk_at(scene.drive, t)
     nothing = _zeros(now.bristles)
     first = joined((0.0, 1.0 / radius), nothing)
@@ -195,14 +202,15 @@ def _jacobian_without_bristles(scene, mode, t, y):
         return 0.0, per_radius, 0.0, 0.0
     # At the end of slip the velocity is zero but for rounding, which must not turn friction round.
     v = mode.sign * max(mode.sign * y[1], 1e-300)
-    by_place, by_v, _ = acceleration_slopes(scene, slip_at(scene, mode, t, (y[0], v)))
+    now = slip_at(scene, mode, t, (y[0], v))
+    by_place, by_v, _ = acceleration_slopes(laden_at(scene.drive, scene, t), now)
     return 0.0, per_radius, by_place, 0.0 if in_dead_band else by_v
 
 
 @variation.jacobian.implements(BristleBelt)
 def _jacobian_with_bristles(scene, mode, t, y):
     """Implement :func:`variation.jacobian`."""
-    now = slip_at(scene, mode, t, y)
+    now, scene = slip_at(scene, mode, t, y), laden_at(scene.drive, scene, t)
     by_place, by_v, _ = acceleration_slopes(scene, now)
     (by_z,), (bundle,) = by_deflections(now.bristles, scene, now), now.bristles
     return 0.0, 1.0, 0.0, by_place, by_v, by_z, 0.0, bundle.rate_v, bundle.rate_z

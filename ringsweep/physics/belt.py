@@ -1,10 +1,10 @@
 """The belt: a mass on a spring, dragged by a moving belt through dry friction (the paper's Fig. 1).
 
-.. math:: m \\ddot x = -k x - k_3 x^3 - c \\dot x + P(t) - F, \\qquad v = \\dot x - v_b , \\qquad N = m g + k_n x
+.. math:: m \\ddot x = -k x - k_3 x^3 - c \\dot x + P(t) - F, \\qquad v = \\dot x - v_b , \\qquad N = m g + k_n x + L(t)
 
 F is the friction force at the sliding velocity v: the friction coefficient, or the traction of bristles, times N, and
 viscous friction. A belt may lack the cubic part :math:`k_3 x^3` of the spring, the damper c, the normal stiffness
-:math:`k_n` and the force P.
+:math:`k_n`, the load L and the force P.
 
 The body is kinematically one on a ring of radius 1 with one contact: the functions of :mod:`ringsweep.physics.ring`
 are those of its balances, with x, the given force and the velocity in place of sine, cosine and angular velocity.
@@ -14,22 +14,26 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ringsweep.compile import absorbed, feature, replacing
+from ringsweep.physics import drives
 from ringsweep.physics.bodies import LINE
+from ringsweep.physics.forces import Laden
 from ringsweep.physics.ring import body
 from ringsweep.quantities.parameters import Leaf
 
 #: Symbols of the parts that a body may lack. The force is the sum of the external and of the viscous force.
-OPTIONAL = "cubic", "damping", "normal_stiffness", "force"
+OPTIONAL = "cubic", "damping", "normal_stiffness", "load", "force"
 
 
 @body(
     balances=(
-        "0 = N1 - mass*gravity - normal_stiffness*x",
+        "0 = N1 - mass*gravity - normal_stiffness*x - load",
         "mass*x_dd = -stiffness*x - cubic*x**3 - damping*velocity + force + K1*N1",
     ),
     energy="0.5*mass*velocity**2 + 0.5*stiffness*x**2 + 0.25*cubic*x**4",
     coordinate=LINE,
     optional=OPTIONAL,
+    varying=("load",),
 )
 class OnBelt(NamedTuple):
     """Body, spring and damper.
@@ -46,6 +50,8 @@ class OnBelt(NamedTuple):
         Coefficient of the damper between the body and the wall, N s/m.
     normal_stiffness : float
         Growth of the normal reaction with the displacement, N/m.
+    load : float
+        Load at an instant, N; see :func:`laden`. In a cell the largest magnitude.
     constants : tuple of float
         See :func:`ringsweep.physics.ring.completed`.
     """
@@ -56,6 +62,7 @@ class OnBelt(NamedTuple):
     cubic: Leaf
     damping: Leaf
     normal_stiffness: Leaf
+    load: Leaf
     constants: tuple[Leaf, ...] = ()
 
 
@@ -120,6 +127,31 @@ class Belt(NamedTuple):
     section: Any = ()
     initial_z: Any = ()
     stops: Any = ()
+
+
+_with_body, _with_load = replacing("body"), replacing("load")
+
+
+@absorbed
+def with_load(scene, load):
+    """Scene whose body carries a load of so many N besides its weight."""
+    return _with_body(scene, _with_load(scene.body, load))
+
+
+@feature("scene", of=Laden, absorb=True)
+def laden(drive, scene, forcing):
+    """Scene whose body carries the load of an instant, if the scene has a load that varies in time.
+
+    `forcing` is what :func:`ringsweep.physics.drives.turn` or :func:`ringsweep.physics.drives.lookup` returned for the
+    `drive` of the scene.
+    """
+    return with_load(scene, forcing[-2])
+
+
+@feature("scene", of=Laden)
+def laden_at(drive, scene, t):
+    """Scene whose body carries the load of a time; see :func:`laden`."""
+    return with_load(scene, drives.turn(drive, t)[-2])
 
 
 class BristleBelt(Belt):

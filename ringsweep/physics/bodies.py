@@ -94,6 +94,8 @@ class Equations:
         Field with half the angle between the contacts; empty for an angle of 0.
     absent : collection of str
         Symbols that are 0 in balances and energy: fields of parts that the body lacks.
+    varying : collection of str
+        Fields that change during a run: no constant of the body contains them.
 
     Raises
     ------
@@ -109,6 +111,7 @@ class Equations:
         coordinate: Coordinate = ANGLE,
         offset: str = "",
         absent: Collection[str] = (),
+        varying: Collection[str] = (),
     ):
         """Read the balances, and refuse what is not linear, not known, or has a name twice."""
         self.texts, self.contacts, self.offset = tuple(balances), len(balances) - 1, offset
@@ -152,7 +155,10 @@ class Equations:
         self.sign = -1.0 if self.whole != ONE and sum(self.free.values()) < 0.0 else 1.0
         self.numerators, self.whole = [p * self.sign for p in self.numerators], self.whole * self.sign
         self.free *= self.sign
-        self.source = Source(fields, ("K1", "K2", "slope_1", "slope_2", "one", "both"))
+        self.varying = [name for name in varying if name in fields]
+        self.source = Source(
+            [name for name in fields if name not in varying], ("K1", "K2", "slope_1", "slope_2", "one", "both")
+        )
         if self.whole != ONE:
             # Without friction the determinant is positive: the first constant of a body is its sign as it is computed.
             self.source.constants[_SIGN] = self.free

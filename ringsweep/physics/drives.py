@@ -766,7 +766,7 @@ def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np
     return drive(**columns, knots=knots) if function.knots else drive(**columns)
 
 
-def largest(force: Any, spans: NDArray[np.float64]) -> Any:
-    """About the largest magnitude of forces by formula within spans of time (s), N, of shape ``(cells,)``."""
+def extremes(force: Any, spans: NDArray[np.float64]) -> Any:
+    """About the least and the greatest value of forces by formula within spans of time (s), N, shape ``(2, cells)``."""
     knots = getattr(force, "knots", np.empty((len(spans), 0)))
-    return functions_of_time.largest_size(FORMULAS[type(force)], force._asdict(), knots, spans)
+    return functions_of_time.extremes(FORMULAS[type(force)], force._asdict(), knots, spans)

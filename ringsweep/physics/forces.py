@@ -48,7 +48,43 @@ class Forced(NamedTuple):
     largest: Leaf
 
 
-@feature("0.0", of=Forced, absorb=True)
+class Laden(NamedTuple):
+    """Drive with a force on the body and a normal load on it that varies in time.
+
+    In what :func:`ringsweep.physics.drives.turn` returns the rate of the load, N/s, and the load, N, stand before the
+    force; in what :func:`ringsweep.physics.drives.lookup` returns the load alone.
+
+    Attributes
+    ----------
+    forced : Forced
+    load : NamedTuple
+        Drive whose "angle" is the load, N.
+    largest : float
+        Bound on the magnitude of the force, N.
+    least_load : float
+        Bound on the load from below, N.
+    """
+
+    forced: Any
+    load: Any
+    largest: Leaf
+    least_load: Leaf
+
+
+@feature("load", of=Laden)
+def load_rate(drive, load, forcing):
+    """Rate of the normal load, N/s: that of the motion, `load`, and that of the load that varies in time."""
+    return load + forcing[4]
+
+
+@feature("0.0", of=Laden)
+def expand_load(drive, t, order, load, work):
+    """Fill the Taylor series of the load about time `t`; see :func:`expand_force`. Nothing without such a load."""
+    drives.expand_at(drive.load, t, order, load, work)
+    return 0.0
+
+
+@feature("0.0", of=(Forced, Laden), absorb=True)
 def force_in(drive, forcing):
     """Force on the body, N.
 
@@ -66,7 +102,7 @@ def force_in(drive, forcing):
     return forcing[-1]
 
 
-@feature("0.0", of=Forced)
+@feature("0.0", of=(Forced, Laden))
 def force_rate(drive, forcing):
     """Time derivative of the force, N/s; 0 without a force.
 
@@ -79,7 +115,7 @@ def force_rate(drive, forcing):
     return forcing[3]
 
 
-@feature("0.0", of=Forced)
+@feature("0.0", of=(Forced, Laden))
 def largest_force(drive):
     """Bound on the magnitude of the force, N; 0 without a force."""
     return drive.largest
@@ -151,7 +187,7 @@ def _expand_motion_of_forced(drive, t, order, theta, work):
     drives.expand_at(drive.motion, t, order, theta, work)
 
 
-@drives.time_for.implements(Forced)
+@drives.time_for.implements(Forced, Laden)
 def _time_for_forced(drive, t):
     """Implement :func:`drives.time_for`: each of the two converts the time for itself."""
     # Of the motion and of the force each may take another kind of time.
@@ -180,3 +216,69 @@ def _beginning_of_forced(drive):
 def _period_of_forced(drive):
     """Implement :func:`drives.period`: the common one; infinite if there is none."""
     return common_period(drives.period(drive.motion), drives.force_period(drive.force))
+
+
+@expand_force.implements(Laden)
+def _expand_force_of_laden(drive, t, order, force, work):
+    """Implement :func:`expand_force`."""
+    expand_force(drive.forced, t, order, force, work)
+
+
+@drives.turn.implements(Laden)
+def _turn_of_laden(drive, t):
+    """Implement :func:`drives.turn`, and the rates, N/s, and values, N, of load and force."""
+    theta, omega, epsilon, rate, force = drives.turn(drive.forced, t)
+    load, rate_of_load, _ = drives.turn(drive.load, t)
+    return theta, omega, epsilon, rate, rate_of_load, load, force
+
+
+@drives.turn_near.implements(Laden)
+def _turn_near_of_laden(drive, course, now, s):
+    """Implement :func:`drives.turn_near`, and the rates, N/s, and values, N, of load and force."""
+    theta, omega, epsilon, rate, force = drives.turn_near(drive.forced, course, now, s)
+    load, rate_of_load, _ = drives.turn(drive.load, later(now, s))
+    return theta, omega, epsilon, rate, rate_of_load, load, force
+
+
+@drives.table_row.implements(Laden)
+def _table_row_of_laden(drive, t):
+    """Implement :func:`drives.table_row`: the row of motion and force, and the shape of the load."""
+    s, rate, force = drives.table_row(drive.forced, t)
+    return s, rate, force, drives.shape(drive.load, t)[0]
+
+
+@drives.lookup.implements(Laden)
+def _lookup_of_laden(drive, table, k):
+    """Implement :func:`drives.lookup`, and load and force, N."""
+    theta, omega, force = drives.lookup(drive.forced, table, k)
+    return theta, omega, drives.amplitude(drive.load) * table[k, 3], force
+
+
+@drives.expand.implements(Laden)
+def _expand_motion_of_laden(drive, t, order, theta, work):
+    """Implement :func:`drives.expand`: of the motion."""
+    drives.expand_at(drive.forced, t, order, theta, work)
+
+
+@drives.jerk.implements(Laden)
+def _jerk_of_laden(drive, t):
+    """Implement :func:`drives.jerk`: of the motion."""
+    return drives.jerk_at(drive.forced, t)
+
+
+@drives.next_knot.implements(Laden)
+def _next_knot_of_laden(drive, t):
+    """Implement :func:`drives.next_knot`: of motion, force or load, whichever is first."""
+    return min(drives.next_knot(drive.forced, t), drives.next_knot(drive.load, t))
+
+
+@drives.beginning.implements(Laden)
+def _beginning_of_laden(drive):
+    """Implement :func:`drives.beginning`: of the motion."""
+    return drives.beginning(drive.forced)
+
+
+@drives.period.implements(Laden)
+def _period_of_laden(drive):
+    """Implement :func:`drives.period`: the common one; infinite if there is none."""
+    return common_period(drives.period(drive.forced), drives.force_period(drive.load))

@@ -260,10 +260,11 @@ def check(
                 )
 
 
-def largest_size(function: Function, values: Values, knots: NDArray[np.float64], spans: NDArray[np.float64]) -> Any:
-    """About the largest magnitude of a function, of shape ``(cells,)``; see :func:`check`."""
+def extremes(function: Function, values: Values, knots: NDArray[np.float64], spans: NDArray[np.float64]) -> Any:
+    """About the least and the greatest value of a function, of shape ``(2, cells)``; see :func:`check`."""
     times = _SHARES[:, None] * spans
-    return np.broadcast_to(abs(evaluate(function.value, times, values, list(knots.T))), times.shape).max(axis=0)
+    found = np.broadcast_to(evaluate(function.value, times, values, list(knots.T)), times.shape)
+    return np.stack([found.min(axis=0), found.max(axis=0)])
 
 
 # ---- periods ----------------------------------------------------------------------------------

@@ -383,6 +383,7 @@ def body(
     offset: str = "",
     coordinate: Coordinate = ANGLE,
     optional: tuple[str, ...] = (),
+    varying: tuple[str, ...] = (),
 ) -> Callable[[type], type]:
     """Declare a body: decorator of the ``NamedTuple`` of its parameters.
 
@@ -401,6 +402,8 @@ def body(
         coordinate they take its numbers as `motion`, and its acceleration in place of `phi_dd`.
     optional : tuple of str
         Symbols of parts that a body may lack, see :func:`variant`. Without them their terms cost nothing.
+    varying : tuple of str
+        Fields that change during a run.
 
     Raises
     ------
@@ -418,13 +421,13 @@ def body(
             raise TypeError(f"{cls.__name__}: offset names the field {offset}, which does not exist")
         try:
             # A mistake is told where it is made.
-            whole = Equations(cls._fields, balances, energy, coordinate, offset)
+            whole = Equations(cls._fields, balances, energy, coordinate, offset, (), varying)
         except ValueError as error:
             raise TypeError(f"{cls.__name__}: {error}") from None
         for count in range(len(optional) + 1):
             for absent in combinations(optional, count):
                 variant = _VARIANTS[cls, frozenset(absent)] = _without(cls, absent)
-                make = partial(Equations, variant._fields, balances, energy, coordinate, offset, absent)
+                make = partial(Equations, variant._fields, balances, energy, coordinate, offset, absent, varying)
                 _EQUATIONS[variant] = cache(make) if absent else lambda: whole
                 _complete.pop(variant, None)
         return cls
@@ -470,6 +473,7 @@ def _derive(cls: type) -> Equations:
     for function in DERIVED:
         names = list(inspect.signature(function).parameters)
         named = [f"{own[name]} = {name}" for name in names if name in own]
+        named += [f"{name} = body.{name}" for name in equations.varying]
         lines = [*named, *equations.lines(function.__name__)]
         function.implements(cls)(function_from_lines(", ".join(names), lines, {}))
     _complete[cls] = equations

@@ -121,6 +121,7 @@ HISTORY: dict[str, Variable] = {
     "belt_velocity": Variable("m/s", "velocity of the belt"),
     "friction_force": Variable("N", "friction force"),
     "force": Variable("N", "applied force on the body"),
+    "load": Variable("N", "applied normal load on the body, beside its weight"),
     "deflection": Variable("m", "deflection of the bristles"),
     "contact_age": Variable("s", "age of the contacts"),
     "deflection_1": Variable("m", "deflection of the bristles at contact 1"),

@@ -79,7 +79,9 @@ class TaskResult:
 def kernels_of(config: Config) -> Hashable:
     """What decides which kernels the cells of a sweep compile."""
     # They depend on the paths that have a value, but not on the numbers of a table.
-    structures = (replace(one, table=None, force=None, curve=None) for one in config.scene.structures.values())
+    structures = (
+        replace(one, table=None, force=None, load=None, curve=None) for one in config.scene.structures.values()
+    )
     return config.solver, frozenset((*config.scene.values, *config.axes.columns)), *structures
 
 

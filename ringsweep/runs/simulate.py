@@ -16,7 +16,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import batch, model_of
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
-from ringsweep.physics.forces import Forced
+from ringsweep.physics.forces import Forced, Laden
 from ringsweep.quantities.flags import AFTERMATHS, REGIMES
 from ringsweep.quantities.variables import EVENTS, HISTORY, IMPACTS
 from ringsweep.runs.events import Events, events, history_at, side_by_side
@@ -153,8 +153,10 @@ def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Datas
         motion = np.empty((len(times), len(turn(drive, 0.0))))
         tabulate_motion(drive, times, motion)
         columns |= dict(zip(model.driven, motion.T, strict=False))
-        if isinstance(drive, Forced):
+        if isinstance(drive, Forced | Laden):
             columns["force"] = motion[:, -1]
+        if isinstance(drive, Laden):
+            columns["load"] = motion[:, -2]
     variables = HISTORY | model.own_variables
     run = xr.Dataset(
         {

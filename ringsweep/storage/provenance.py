@@ -66,12 +66,14 @@ def identity(config: Config) -> dict[str, str]:
     if LAW not in axes.columns:
         found[f"scene.{LAW}"] = structure.law
     curve = next((one.curve for one in scene.structures.values() if one.curve is not None), None)
-    for path, table in (("friction", curve), ("drive", structure.table), ("force", structure.force)):
+    tables = {"friction": curve, "drive": structure.table, "force": structure.force, "body.load": structure.load}
+    for path, table in tables.items():
         if table is not None:
             found[f"scene.{path}"] = f"a table of {len(table[0])} rows ({_digest(*table[:2])})"
             found |= {f"scene.{path}.interpolate": interpolate for interpolate in table[2:]}
     formulas = {f"friction.laws.{law}": own.own_law for law, own in scene.structures.items()}
     formulas |= {f"drive.{structure.drive_key}": structure.own_drive, "force.formula": structure.own_force}
+    formulas["body.load.formula"] = structure.own_load
     found |= {f"scene.{path}": str(formula.__doc__) for path, formula in formulas.items() if formula is not None}
     for path, value in scene.values.items():
         if path not in axes.columns:

@@ -15,7 +15,7 @@ from ringsweep.models.interface import audit, implicit
 from ringsweep.models.sliding import audited, imbalances, larger, speed_in
 from ringsweep.models.slip import acceleration_slopes, slip
 from ringsweep.physics import ring
-from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.belt import Belt, BristleBelt, laden
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.quantities.flags import OSCILLATORY, SEPARATING
@@ -49,7 +49,7 @@ def _least_scales_on_belt(batch):
 @audit.violation.implements(Belt)
 def _violation_on_belt(scene, mode, forcing, y, rates, s, tolerance):
     """Implement :func:`audit.violation` for laws of the velocity: law, balance, and sign of the reaction."""
-    x, v = y
+    (x, v), scene = y, laden(scene.drive, scene, forcing)
     body, push = scene.body, force_in(scene.drive, forcing)
     velocity = forcing[1] if mode.sign == 0 else moving(scene, v + forcing[1], v, forcing[1])
     moves = abs(velocity) + abs(forcing[1])
@@ -99,7 +99,7 @@ def _audited_on_bristle_belt(scene, mode, forcing, y):
 def _undecided_on_belt(batch, one, other, fall_rates):
     """Implement :func:`audit.undecided`: sliding or oscillatory, and separated or not."""
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        return _sliding_or_swing(batch, one, other) | _may_hold(batch.body, one, other, fall_rates)
+        return _sliding_or_swing(batch, one, other) | _may_hold(batch, one, other, fall_rates)
 
 
 def _sliding_or_swing(batch, one, other):
@@ -113,18 +113,19 @@ def _sliding_or_swing(batch, one, other):
     return (one.regime == OSCILLATORY) & ~swings
 
 
-def _may_hold(body, one, other, fall_rates):
+def _may_hold(batch, one, other, fall_rates):
     """Which runs an error could make separate, or keep from separating; `fall_rates` in N/s."""
+    body = batch.body
     if not ring.if_load_varies(body, True, False):
         return np.zeros(len(fall_rates), dtype=bool)
-    growth = body.normal_stiffness
-    least, second = (
-        body.mass * body.gravity + np.minimum(growth * found.x_min, growth * found.x_max) for found in (one, other)
-    )
+    growth, weight = getattr(body, "normal_stiffness", 0.0), body.mass * body.gravity
+    weight = weight + getattr(batch.drive, "least_load", 0.0)
+    least, second = (weight + np.minimum(growth * found.x_min, growth * found.x_max) for found in (one, other))
     separated = one.regime == SEPARATING
     # The acceleration is at most about that of the spring and of the load where the reaction vanishes.
     far = np.maximum(np.abs(one.x_min), np.abs(one.x_max))
     curvature = np.abs(growth) * (body.gravity + (body.stiffness + np.abs(growth)) / body.mass * far)
+    curvature += getattr(body, "load", 0.0) * (2.0 * np.pi / np.minimum(batch.forcing_period, batch.span)) ** 2
     slow = _FALL_FACTOR * np.abs(one.t_end - other.t_end) * curvature > fall_rates
     # A load that is least at launch, where it may be zero, is the same in both runs.
     return np.where(separated, (one.t_end > 0.0) & slow, least < 2.0 * np.abs(least - second))

@@ -20,8 +20,8 @@ from ringsweep.models.slip import Slip, bundled, region_guards, slip, slip_at
 from ringsweep.numerics.functions import select
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import drives, ring
-from ringsweep.physics.belt import BristleBelt
-from ringsweep.physics.forces import force_in
+from ringsweep.physics.belt import BristleBelt, laden
+from ringsweep.physics.forces import force_in, load_rate
 from ringsweep.physics.friction.presliding import (
     after_yield,
     initial_deflection,
@@ -92,16 +92,18 @@ def _begin_on_bristle_belt(scene):
     y = scene.initial_x, v, z
     sign = 1 if v > 0.0 else -1
     now = slip_at(scene, Mode(1, BAND, -1), t, y)
-    acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
+    forcing = drives.turn(scene.drive, t)
+    body = laden(scene.drive, scene, forcing).body
+    acceleration, _ = ring.acceleration(body, *now.K, now.motion)
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
-        sign = 1 if acceleration > drives.turn(scene.drive, t)[2] else -1
+        sign = 1 if acceleration > forcing[2] else -1
     mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC, -1)
-    load = ring.reactions(scene.body, *now.K, now.motion)[0]
+    load = ring.reactions(body, *now.K, now.motion)[0]
     if load == 0.0:
         # The contact holds if the load begins to grow.
         ahead = now.motion[2] if now.motion[2] != 0.0 else acceleration
-        load = ring.held(scene.body, 0.0, (ahead, 0.0, 0.0), 0.0, 0.0, 0.0)[0]
+        load = load_rate(scene.drive, ring.held(body, 0.0, (ahead, 0.0, 0.0), 0.0, 0.0, 0.0)[0], forcing)
         opens = load <= 0.0
     else:
         opens = load < 0.0

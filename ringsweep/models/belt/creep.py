@@ -13,6 +13,7 @@ from ringsweep.models.belt.force import coefficients, if_force, length_scale, lo
 from ringsweep.models.interface import implicit, modes
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.physics import belt, drives, ring
+from ringsweep.physics.belt import laden
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.presliding import shown  # noqa: F401
 from ringsweep.physics.friction.registry import holds_in_band
@@ -60,7 +61,7 @@ def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
     The motion is displacement, velocity and acceleration in space, friction (N), displacement relative to the belt,
     sliding velocity, acceleration of the belt, and deflection of the bristles (NaN without bristles).
     """
-    now, body = slip(scene, mode, common, forcing, x), scene.body
+    now, body = slip(scene, mode, common, forcing, x), laden(scene.drive, scene, forcing).body
     acceleration, _ = ring.acceleration(body, *now.K, now.motion)
     normal, _ = ring.reactions(body, *now.K, now.motion)
     friction = now.damping * body.mass * x[1] - now.K[0] * normal

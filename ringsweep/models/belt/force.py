@@ -11,9 +11,9 @@ from ringsweep.compile import absorbed, feature, inlined
 from ringsweep.models.interface import shock
 from ringsweep.models.slip import Slip
 from ringsweep.numerics.functions import opposing, select
-from ringsweep.physics import drives, ring
+from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.belt import OnBelt
-from ringsweep.physics.forces import force_in, force_rate, largest_force
+from ringsweep.physics.forces import force_in, force_rate, largest_force, load_rate
 from ringsweep.physics.friction.registry import dead_band
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.friction.ways import TwoWay, along
@@ -54,6 +54,7 @@ def slip_from(scene, x, velocity, v, forcing):
     Slip
         Friction balances the other forces in a dead band, as far as it can.
     """
+    scene = belt.laden(scene.drive, scene, forcing)
     mu, slope = friction_at(scene.law, abs(v), coefficients(scene, v))
     push, viscous = force_in(scene.drive, forcing), if_force(scene.body, scene.viscous, 0.0)
     held = abs(v) < dead_band(scene.law)
@@ -125,7 +126,7 @@ def stuck_rates(scene, t, x, forcing):
     push_rate, jerk = force_rate(scene.drive, forcing), drives.jerk_at(scene.drive, t)
     rates, cube_rate = (velocity, push_rate, acceleration), 3.0 * x * x * velocity
     load, _, friction = ring.held(scene.body, 0.0, rates, cube_rate, jerk, 0.0)
-    return -friction, load
+    return -friction, load_rate(scene.drive, load, forcing)
 
 
 @inlined

@@ -50,6 +50,9 @@ _OPTIONAL = {
     "normal_stiffness": "body.normal_stiffness",
 }
 
+# Beginnings of the paths of a load that varies.
+_LOADS = "body.normal_stiffness", "body.load."
+
 
 class Belt(Model, Continues):
     """A mass on a spring on a moving belt (the paper's Fig. 1)."""
@@ -101,8 +104,8 @@ class Belt(Model, Continues):
         return np.asarray(self.build(structure, values).forcing_period)
 
     def regimes(self, paths: Collection[str]) -> tuple[str, ...]:
-        """Regimes that runs can have; only a load that changes with the displacement can fall to zero."""
-        lost = ("separating",) if "body.normal_stiffness" in paths else ()
+        """Regimes that runs can have; only a load that varies can fall to zero."""
+        lost = ("separating",) if any(path.startswith(_LOADS) for path in paths) else ()
         return "stick-slip", "oscillatory", "sliding", "sticking", "riding", *lost, "failed"
 
     def scene_type(self, structure: Structure) -> type:
@@ -143,6 +146,10 @@ class Belt(Model, Continues):
         for name, p in declared(structure.drive_type).items():
             found[f"drive.{name}"] = _along_a_line(name, p) if structure.own_drive is None else p
         found["force.constant"] = forces.CONSTANT
+        if structure.own_load is not None:
+            found |= {f"body.load.{name}": p for name, p in declared(structure.own_load).items()}
+        elif structure.load is not None:
+            found["body.load.amplitude"] = replace(forces.FACTOR, long_name="factor on the load of the table")
         if structure.own_force is not None:
             found |= {f"force.{name}": p for name, p in declared(structure.own_force).items()}
         elif structure.force is None:
@@ -190,8 +197,10 @@ class Belt(Model, Continues):
         mass, gravity = values["body.mass"], values["gravity"]
         forced = self._with_force(drive, structure, values)
         parts = {name: values[path] for name, path in _OPTIONAL.items() if path in values}
+        if structure.own_load is not None or structure.load is not None:
+            forced, parts["load"] = _with_load(forced, structure, values)
         acts = {"force"} if forced is not drive or "friction.viscous" in values else set()
-        kind: Any = ring.variant(belt.OnBelt, _OPTIONAL.keys() - parts | {"force"} - acts)
+        kind: Any = ring.variant(belt.OnBelt, {*_OPTIONAL, "load", "force"} - {*parts, *acts})
         fields: dict[str, Any] = {
             "body": ring.completed(kind(mass, gravity, values["spring.stiffness"], **parts, constants=())),
             "mu_s": mu_s,
@@ -277,7 +286,7 @@ class Belt(Model, Continues):
             largest = abs(factor) * np.abs(structure.force[1]).max()
         elif structure.own_force is not None:
             force = by_formula(structure.own_force, "force", "formula", values)
-            largest = drives.largest(force, values["time.span"])
+            largest = abs(drives.extremes(force, values["time.span"])).max(axis=0)
         elif given:
             for name, example in (("amplitude", "1 N"), ("frequency", "1 Hz")):
                 if name not in given:
@@ -343,6 +352,22 @@ def _nearest_balance(
         held = [root.real for root in roots if root.imag == 0.0 and k + 3.0 * k_3 * root.real**2 > 0.0]
         x[i] = min(held, key=abs, default=np.nan)
     return x - (stiffness * x + cubic * x**3 - pull) / (stiffness + 3.0 * cubic * x**2)
+
+
+def _with_load(drive: Any, structure: Structure, values: Values) -> tuple[forces.Laden, NDArray[np.float64]]:
+    """Drive with the normal load that varies in time, and the largest magnitude of that load, N."""
+    zero = np.zeros(len(values["time.span"]))
+    if not isinstance(drive, forces.Forced):
+        drive = forces.Forced(drive, drives.Still(), zero, zero)
+    if structure.load is not None:
+        factor = values["body.load.amplitude"]
+        ends = np.multiply.outer([structure.load[1].min(), structure.load[1].max()], factor)
+        load: Any = table_of(*structure.load, factor, "body.load", values)
+    else:
+        assert structure.own_load is not None
+        load = by_formula(structure.own_load, "body.load", "formula", values)
+        ends = drives.extremes(load, values["time.span"])
+    return forces.Laden(drive, load, drive.largest, ends.min(axis=0)), abs(ends).max(axis=0)
 
 
 # Cycles in a span if neither the forcing nor a spring has a period.

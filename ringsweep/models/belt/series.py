@@ -40,7 +40,7 @@ from ringsweep.numerics.terms import (
     set_factors,
 )
 from ringsweep.physics import belt, drives, ring
-from ringsweep.physics.forces import expand_force, force_in, largest_force
+from ringsweep.physics.forces import Laden, expand_force, expand_load, force_in, largest_force
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import (
     KINETIC,
@@ -56,7 +56,7 @@ from ringsweep.physics.friction.velocity import (
 from ringsweep.physics.friction.ways import along
 
 # Rows of the table of series; the guards are last.
-X, V, VELOCITY, ACCELERATION, FORCE, SHIFT, PUSH, SQUARE, CUBE, RATIO, FACTORS = range(11)
+X, V, VELOCITY, ACCELERATION, FORCE, SHIFT, PUSH, LOAD, SQUARE, CUBE, RATIO, FACTORS = range(12)
 _GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
 # The normal reaction is a guard only if it varies.
 NORMAL, SLOW, FAST = range(_GUARDS, _GUARDS + 3)
@@ -98,8 +98,9 @@ def _begin_on_belt(scene):
     """Implement :func:`modes.begin`; the state is ``(x, v)``."""
     t, x = drives.beginning(scene.drive), scene.initial_x
     v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
+    laden = belt.laden_at(scene.drive, scene, t)
     status, mode = RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
-    if ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
+    if ring.if_load_varies(scene.body, True, False) and ring.reactions(laden.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
         status, mode = SEPARATED_1, Mode(0, KINETIC, -1)
     elif holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
         mode = mode_at_rest(scene, Instant(t, 0.0), x)
@@ -113,7 +114,7 @@ def _begin_on_belt(scene):
 def mode_at_rest(scene, t, x):
     """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
     forcing = drives.turn(scene.drive, t)
-    pull = stuck_pull(scene, x, 0.0, forcing)
+    scene, pull = belt.laden(scene.drive, scene, forcing), stuck_pull(scene, x, 0.0, forcing)
     bound = breakaway_force(scene, direction(scene.mu_s, pull, scene, t, x, forcing), x)
     least = rounding_of_reserve(scene, (x, force_in(scene.drive, forcing), forcing[1]), forcing[2])
     if bound == 0.0 and pull == 0.0:
@@ -141,8 +142,9 @@ def _switch_on_belt(scene, mode, guard, t, y):
     sign, region = mode.sign, mode.region
     if sign == 0:
         # A long series may reach the breakaway force by its own error alone: one more, short step decides.
-        pull = stuck_pull(scene, x, 0.0, drives.turn(scene.drive, t))
-        if mode.entry_guard != guard and abs(pull) <= breakaway_force(scene, pull, x):
+        forcing = drives.turn(scene.drive, t)
+        pull, laden = stuck_pull(scene, x, 0.0, forcing), belt.laden(scene.drive, scene, forcing)
+        if mode.entry_guard != guard and abs(pull) <= breakaway_force(laden, pull, x):
             return RUNNING, Mode(0, KINETIC, guard), y
         return RUNNING, _loose(scene, 1 if guard == SLOW else -1), y
     low, high = region_bounds(scene.law, region)
@@ -176,14 +178,27 @@ def _cube_term(body, c, k):
     return cube
 
 
-@feature("K * load", of=ring.having(belt.OnBelt, "normal_stiffness"))
+@feature("normal", of=ring.having(belt.OnBelt, "load"))
+def _with_load_term(body, c, k, normal):
+    """Coefficient `k` of the reaction, from that without the varying part of the load; `body` carries its value."""
+    return normal if k == 0 else normal + c[LOAD, k]
+
+
+@feature("scene", of=Laden)
+def _laden_after(drive, scene, c, s):
+    """Scene whose body carries the load a time `s` after the beginning of the series."""
+    return belt.with_load(scene, value(c[LOAD], s))
+
+
+@feature("K * load", of={*ring.having(belt.OnBelt, "normal_stiffness"), *ring.having(belt.OnBelt, "load")})
 def _friction_term(body, c, k, K, load):
     """Coefficient `k` of friction, N, from K, that of the friction per load; `load` is the reaction if it is constant.
 
     It fills the rows RATIO and NORMAL, so it is called for each `k` in order.
     """
     c[RATIO, k] = K
-    c[NORMAL, k] = ring.held(body, 1.0 if k == 0 else 0.0, (c[X, k], 0.0, 0.0), 0.0, 0.0, 0.0)[0]
+    normal = ring.held(body, 1.0 if k == 0 else 0.0, (c[X, k], 0.0, 0.0), 0.0, 0.0, 0.0)[0]
+    c[NORMAL, k] = _with_load_term(body, c, k, normal)
     friction = 0.0
     for j in range(k + 1):
         friction += c[RATIO, j] * c[NORMAL, k - j]
@@ -194,6 +209,8 @@ def _friction_term(body, c, k, K, load):
 def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
     """Implement :func:`series.fill_table`: fill all rows of the table, in stick, in a dead band, or in slip."""
     drives.expand_at(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
+    expand_load(scene.drive, t, ORDER, c[LOAD], c[FACTORS:])
+    scene = _laden_after(scene.drive, scene, c, 0.0)
     body = scene.body
     if if_force(body, True, False):
         expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
@@ -209,7 +226,8 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
             if k > 0:
                 c[X, k] = c[SHIFT, k]
             motion, cube = (c[X, k], c[PUSH, k], c[VELOCITY, k]), _cube_term(body, c, k)
-            c[NORMAL, k], _, friction = ring.held(body, one, motion, cube, c[ACCELERATION, k], 0.0)
+            normal, _, friction = ring.held(body, one, motion, cube, c[ACCELERATION, k], 0.0)
+            c[NORMAL, k] = _with_load_term(body, c, k, normal)
             pull, ahead, back = -friction, along(scene.mu_s, 1.0) * c[NORMAL, k], along(scene.mu_s, -1.0) * c[NORMAL, k]
             if mode.sign == 0:
                 c[V, k], c[FORCE, k], c[SLOW, k], c[FAST, k] = y[1] * one, pull, ahead - pull, back + pull
@@ -329,7 +347,7 @@ def _seen_at_on_belt(scene, mode, c, s, h):
     yielding = holds_in_band(scene.law) and mode.region < 0
     if mode.sign != 0 and not yielding:
         # Where the law bends, the series of friction is less exact than that of the motion.
-        sign, body = float(mode.sign), scene.body
+        sign, body = float(mode.sign), _laden_after(scene.drive, scene, c, s).body
         mu, _ = friction_in(scene.law, mode.region, sign * v, coefficients(scene, sign))
         load, _ = ring.reactions(body, 0.0, 0.0, (x, 0.0, velocity))
         before, force = force, sign * mu * load + if_force(body, scene.viscous, 0.0) * v

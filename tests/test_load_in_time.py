@@ -1,0 +1,87 @@
+"""A normal load on the belt that varies in time."""
+
+import numpy as np
+import pytest
+from belts import on_belt, outcome
+
+import ringsweep
+
+
+def braked(load, friction=None, **rest):
+    """A body of 1 kg on the belt with a load beside its weight."""
+    friction = friction or {"law": "stiction", "mu_s": 0.3, "mu_k": 0.2}
+    scene = on_belt(friction, **({"stiffness": 2.0, "velocity": 0.0, "span": 6.0} | rest))
+    return scene | {"body": {"mass": 1.0, "load": load}}
+
+
+def falling(rate):
+    """A load that falls from 0 N."""
+    return {"formula": "-rate*t", "rate": f"{rate} N/s"}
+
+
+def pulsating(amplitude, frequency):
+    """A load that oscillates about 0 N."""
+    return {"formula": "A*sin(2*pi*f*t)", "A": f"{amplitude} N", "f": f"{frequency} Hz"}
+
+
+def test_stuck_body_breaks_loose_as_the_load_falls_to_its_pull():
+    run = outcome(braked(falling(2.0), start=(0.6, 0.0)))
+    assert run.first_slip.item() == pytest.approx((9.81 - 2.0 * 0.6 / 0.3) / 2.0, rel=1e-13)
+    assert run.certified.item() == 1
+
+
+def test_contact_opens_where_the_load_has_taken_the_weight_away():
+    run = outcome(braked(falling(2.0)))
+    assert ringsweep.quantities.flags.REGIMES[run.regime.item()] == "separating"
+    assert run.t_end.item() == pytest.approx(9.81 / 2.0, rel=1e-13)
+
+
+def test_a_body_that_slides_on_is_driven_by_a_pulsating_load():
+    mu, k, amplitude, omega, t = 0.2, 2.0, 4.0, 2.0 * np.pi * 0.7, 6.0
+    run = outcome(braked(pulsating(amplitude, 0.7), velocity=5.0, start=(0.0, 0.0)))
+    own, forced = np.sqrt(k), mu * amplitude / (k - omega**2)
+    x = mu * 9.81 / k * (1.0 - np.cos(own * t)) + forced * (np.sin(omega * t) - omega / own * np.sin(own * t))
+    assert run.x_end.item() == pytest.approx(x, abs=1e-10)
+    assert run.stick_time.item() == 0.0
+
+
+@pytest.mark.slow
+def test_a_constant_load_is_more_gravity():
+    run = outcome(braked({"time": [0, 10], "load": [4, 4]}, velocity=0.4, span=9.0))
+    heavy = on_belt({"law": "stiction", "mu_s": 0.3, "mu_k": 0.2}, 2.0, velocity=0.4, span=9.0, gravity=13.81)
+    other = outcome(heavy)
+    for name in ("first_slip", "x_end", "velocity_end", "x_max", "stick_time", "force_max"):
+        assert run[name].item() == pytest.approx(other[name].item(), rel=1e-11)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "friction",
+    [
+        {"law": "bengisu-akay", "mu_s": 0.3, "mu_k": 0.2, "alpha": 10.0, "v0": 0.01},
+        {"law": "lugre", "mu_s": 0.3, "mu_k": 0.2, "sigma0": 1e3, "sigma1": 10.0, "v_s": 0.05},
+    ],
+)
+@pytest.mark.parametrize("amplitude", [4.0, 12.0])
+def test_rk4_and_events_agree(friction, amplitude):
+    scene = braked(pulsating(amplitude, 0.7), friction, stiffness=20.0, velocity=0.1)
+    run, coarse = outcome(scene), outcome(scene, method="rk4", steps=40000)
+    assert run.regime.item() == coarse.regime.item()
+    for name in ("t_end", "x_end", "x_max"):
+        assert run[name].item() == pytest.approx(coarse[name].item(), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("load", "words"),
+    [
+        ("5 N", "scene.body.load: a section is expected"),
+        ({"formula": "A*sin(w*t)", "w": 1}, "scene.body.load.A: missing"),
+        ({"formula": "A*floor(t)"}, "scene.body.load.formula"),
+        ({"formula": "A*t", "A": 1, "file": "load.csv"}, "scene.body.load.file: cannot stand beside a formula"),
+        ({"time": [0, 1], "load": [1, 2]}, "table of the body.load, which ends at 1 s"),
+        ({"time": [0, 10], "load": [1]}, "scene.body.load.load: 1 loads for 2 times"),
+    ],
+)
+def test_mistakes_are_located(load, words):
+    with pytest.raises(ringsweep.InputError, match=words):
+        ringsweep.sweep(braked(load), {}, progress=False)
