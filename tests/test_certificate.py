@@ -24,13 +24,19 @@ NAMES = MODELS["ring"].outcomes
 COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for name in ("mu_s", "mu_k")]
 
 #: Random scenes with errors that two runs share: a mode that lasts for one step; a long step of a slow creep; the end
-#: of the elastic range of bristles within a step; a fast slide of a slow body; and runs that are close by chance.
+#: of the elastic range of bristles within a step; a fast slide of a slow body; and runs that are close by chance. Then
+#: errors that small numbers hide: of a velocity at a turn; of a small jump; of the instant of the last event.
 BOUNDED = [
     (101, Kind("ring", "hyperbolic", "sinusoidal", arcs=1)),
     (201, Kind("ring", "tanh", "sinusoidal", arcs=1)),
     (101, Kind("belt", "elasto-plastic", force="harmonic", span=(1.0, 8.0))),
     (103, Kind("ring", "elasto-plastic", "sinusoidal", arcs=1, span=(0.2, 1.5))),
     (103, Kind("belt", "tanh", force="harmonic", span=(2.0, 20.0))),
+    (307, Kind("belt", "hyperbolic", force="harmonic", span=(2.0, 20.0))),
+    (411, Kind("ring", "hyperbolic", "sinusoidal", arcs=1)),
+    (307, Kind("ring", "lugre", "sinusoidal", arcs=1, span=(0.2, 1.5))),
+    (307, Kind("belt", "elasto-plastic", force="harmonic", span=(1.0, 8.0))),
+    (307, Kind("ring", "bengisu-akay", "arctan", arcs=1)),
 ]
 
 
@@ -251,11 +257,11 @@ class TestErrors:
     @pytest.mark.parametrize(
         ("method", "law", "drive", "median", "median_of_all"),
         [
-            (Event(), "stiction", "arctan", 150, 400),
+            (Event(), "stiction", "arctan", 150, 450),
             # Most steps end at events, so that a run at a looser tolerance takes the same steps.
-            (Event(rtol=1e-5), "stiction", "arctan", 100, 300),
-            (Implicit(), "bengisu-akay", "arctan", 400, 500),
-            (Implicit(), "bengisu-akay", "power", 800, 1000),
+            (Event(rtol=1e-5), "stiction", "arctan", 100, 350),
+            (Implicit(), "bengisu-akay", "arctan", 400, 600),
+            (Implicit(), "bengisu-akay", "power", 900, 1300),
         ],
     )
     def test_error_bounds_cover_the_true_errors(self, cells, method, law, drive, median, median_of_all):

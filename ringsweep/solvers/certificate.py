@@ -99,14 +99,21 @@ class TwoRuns:
             difference = np.abs(a - self.second_rows[:, columns])
         # A reaction that is infinite before a jam is no scale of the others.
         sizes = np.where(np.isinf(a), np.nan, np.abs(a))
-        units = np.array([OUTCOMES[name].units for name in names])
-        scale, own_scales = np.empty_like(a), {"s": self.batch.span} | least_scales(self.batch)
-        for unit in set(units.tolist()):
-            of_unit = units == unit
-            largest = np.fmax.reduce(sizes[:, of_unit], axis=1, initial=0.0)
+        units = [OUTCOMES[name].units for name in names]
+        own_scales = {"s": self.batch.span} | least_scales(self.batch)
+        largest: dict[str, NDArray[np.float64]] = {}
+        # A number may be small beside those of the motion, which its error follows: a velocity at a turn, a small jump.
+        # In this order a place comes before its velocity, and a velocity before an acceleration.
+        for unit in sorted(set(units)):
             least = own_scales.get(unit, 0.0 if unit[0] in "mNJ" or unit == "rad s-2" else 1.0)
-            scale[:, of_unit] = (largest + least)[:, None]
-        return difference, scale
+            if unit == "m s-1":
+                least = least + largest["m"] / own_scales["s"]
+            if unit == "rad s-2":
+                by_motion = largest["rad s-1"] ** 2 if "rad" in units else largest["m s-1"] / own_scales["s"]
+                least = least + by_motion
+            of_unit = [k for k, other in enumerate(units) if other == unit]
+            largest[unit] = np.fmax.reduce(sizes[:, of_unit], axis=1, initial=0.0) + least
+        return difference, np.stack([largest[unit] for unit in units], axis=1)
 
 
 def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
@@ -226,6 +233,7 @@ def errors(
     *,
     safety: Any,
     share: float,
+    force_share: float = 0.0,
     steps: Any,
     floor: Any = 0.0,
     rate_floor: Any = 0.0,
@@ -244,6 +252,8 @@ def errors(
         Largest error of a run, in units of its difference from the second run.
     share : float
         Share of the largest relative difference that counts in every outcome.
+    force_share : float
+        The same in forces and jumps, if it is larger.
     steps : ndarray of shape ``(cells,)``
         Number of steps. Their rounding accumulates.
     floor, rate_floor : float or ndarray of shape ``(cells,)``
@@ -263,7 +273,8 @@ def errors(
     difference, scale = runs.differences
     with np.errstate(invalid="ignore", over="ignore"):
         of_motion = [k for k, name in enumerate(names) if name not in _FORCES]
-        least = share * _largest(difference[:, of_motion], scale[:, of_motion])[:, None] * scale
+        shares = [share if k in of_motion else max(share, force_share) for k in range(len(names))]
+        least = shares * _largest(difference[:, of_motion], scale[:, of_motion])[:, None] * scale
         bound: NDArray[np.float64] = np.atleast_1d(safety)[:, None] * np.maximum(difference, least)
         bound += np.atleast_1d(floor + _ROUNDING * np.sqrt(1.0 + np.asarray(steps)))[:, None] * scale
         units = [OUTCOMES[name].units for name in names]
@@ -275,10 +286,16 @@ def errors(
                 bound[:, k] += force_floor * scale[:, k]
             if names[k] == "force_max":
                 bound[:, k] += friction_floor * scale[:, k]
-    # A run that reaches the end of the span has an exact time of its end.
+    # A run that reaches the end of the span has an exact time of its end, and without an event nothing jumps.
     one, _ = runs.named
-    reached = one.regime == one.motion
-    bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
+    end, jump = names.index("t_end"), names.index("jump_max")
+    bound[(one.regime == one.motion) & (difference[:, end] == 0.0), end] = 0.0
+    bound[(one.jump_max == 0.0) & (difference[:, jump] == 0.0), jump] = 0.0
+    # If two runs end at nearly the same event by chance, their last velocities are close by the same chance.
+    last = names.index("omega_end" if "omega_end" in names else "velocity_end")
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        acceleration = np.minimum(difference[:, last] / difference[:, end], scale[:, jump])
+        bound[:, last] = np.fmax(bound[:, last], bound[:, end] * acceleration)
     bound[~agree(runs.rows, runs.second_rows, runs.outcomes)] = np.nan
     return bound
 

@@ -37,15 +37,15 @@ _MOST_RETRIES = 3
 # Errors of a run that the difference from the second run does not show, found by experiment, see docs/accuracy.md. In
 # units of the remainder of a series: once in a run, and for each shared step; of forces, in units of the remainder that
 # their tolerance allows, since within a step they come from the series. In units of the tolerance of an implicit step:
-# once in a run with bristles; for each shared step under smooth laws; and for each with bristles, whose fast vibrations
-# all runs damp.
+# once in a run with bristles; and for each shared step, a share of its estimate, under smooth laws and with bristles:
+# their law may bend within the step, which deceives the estimate, and all runs damp their vibrations.
 _ONCE, _SHARED, _SHARE_OF_REACTIONS = 0.2, 3.0, 0.05
-_ONCE_IMPLICIT, _SHARED_IMPLICIT, _SHARED_BRISTLES = 0.05, 0.05, 0.2
+_ONCE_IMPLICIT, _SHARED_IMPLICIT, _SHARED_BRISTLES = 0.05, 0.05, 1.0
 
-# Largest error of a run, in units of its difference from the run at the looser tolerance, and share of the largest
-# relative difference that counts in every number. Where friction varies with the speed, the errors of both runs are as
-# good as independent: where steps end decides their signs and sizes.
-_SAFETY_AND_SHARE = {"constant": (0.8, 0.04), "varying": (2.0, 0.05), "bristles": (2.0, 0.2)}
+# Largest error of a run, in units of its difference from the run at the looser tolerance; and shares of the largest
+# relative difference that count in every number, and in forces. Where friction varies with the speed, the errors of
+# both runs are as good as independent: the ends of steps decide their signs and sizes. Forces magnify them.
+_CONSTANT, _VARYING, _BRISTLES = (0.8, 0.04, 0.04), (2.0, 0.05, 0.2), (2.0, 0.2, 1.0)
 
 # Impacts magnify the errors before them: a small difference of two runs is then less certain by this factor.
 _MAGNIFIED = 3.0
@@ -174,24 +174,17 @@ class _Piecewise(Method):
         obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
         tolerance, implicit_tolerance = self.tolerances()
         local = LocalErrors(*audits[:, 3:].T)
-        if of_bristles:
-            floor = implicit_tolerance * (_ONCE_IMPLICIT + _SHARED_BRISTLES * local.implicit)
-            force_floor, friction_floor = 0.0, np.zeros(len(steps))
-            rate_floor = implicit_tolerance * _SHARED_BRISTLES * local.rate
-        else:
-            # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
-            ratio = tolerance ** (1.0 / ORDER)
-            remainder = tolerance * ratio / (1.0 - ratio)
-            floor = remainder * (_ONCE + _SHARED * local.series)
-            force_floor = _SHARE_OF_REACTIONS * REACTION_TOLERANCE * remainder
-            floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
-            # In the stiction band the error of the velocity, a share of the band, is that of friction, a share of it.
-            friction_floor = np.where(local.implicit > 0.0, implicit_tolerance, 0.0)
-            rate_floor = tolerance * local.rate
+        # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
+        ratio = tolerance ** (1.0 / ORDER)
+        remainder = tolerance * ratio / (1.0 - ratio)
+        once, shared = (_ONCE_IMPLICIT, _SHARED_BRISTLES) if of_bristles else (0.0, _SHARED_IMPLICIT)
+        floor = remainder * (_ONCE + _SHARED * local.series) + implicit_tolerance * (once + shared * local.implicit)
+        # In the stiction band the error of the velocity, a share of the band, is that of friction, a share of it.
+        friction_floor = np.where(local.implicit > 0.0, implicit_tolerance, 0.0)
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         _, magnified, left_out = audit.of_events(batch, runs.named[0])
         is_constant = family_of(type(batch.law)) is SetValued and not varies(take(batch, 0).law, 0)
-        safety, share = _SAFETY_AND_SHARE["constant" if is_constant else "bristles" if of_bristles else "varying"]
+        safety, share, force_share = _CONSTANT if is_constant else _BRISTLES if of_bristles else _VARYING
         because, bounds = judged(
             runs,
             audits[:, 2],
@@ -199,10 +192,11 @@ class _Piecewise(Method):
             (~obeys_law, LAW_NOT_OBEYED),
             safety=np.where(magnified, _MAGNIFIED, 1.0) * safety,
             share=share,
+            force_share=force_share,
             steps=steps,
             floor=floor + left_out,
-            rate_floor=rate_floor,
-            force_floor=force_floor,
+            rate_floor=self.tolerances()[of_bristles] * local.rate,
+            force_floor=_SHARE_OF_REACTIONS * REACTION_TOLERANCE * remainder,
             friction_floor=friction_floor,
         )
         may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])

@@ -117,12 +117,13 @@ _FALL_FACTOR = 5.0
 
 @audit.least_scales.implements(ring.Ring, ring.BristleRing)
 def rates_and_times(batch):
-    """Implement :func:`audit.least_scales`: of angular velocities, rad/s, and of times, s; the impact calls it too.
+    """Implement :func:`audit.least_scales`: of angular velocities, accelerations and times; the impact calls it too.
 
     See :func:`ringsweep.models.sliding.rate_at_rest`.
     """
     rate = rate_at_rest(batch)
-    return {"rad s-1": rate, "s": np.minimum(1.0 / rate, batch.span)}
+    acceleration = batch.body.gravity / batch.body.radius
+    return {"rad s-1": rate, "rad s-2": acceleration, "s": np.minimum(1.0 / rate, batch.span)}
 
 
 @audit.is_reaction.implements(ring.Ring, ring.BristleRing)
