@@ -202,3 +202,16 @@ def test_mistakes_are_located(changed, message):
     scene |= {key: scene[key] | value if isinstance(value, dict) else value for key, value in changed.items()}
     with pytest.raises(InputError, match=message):
         ringsweep.simulate(scene)
+
+
+def test_a_loose_tolerance_does_not_chatter_where_a_contact_stops():
+    """There an error of friction is a factor of the speed."""
+    friction = {"law": "dieterich", "mu0": 0.54, "a": 0.0038, "b": 0.0157}
+    scene = on_belt(
+        friction | {"critical_distance": 5.5e-5, "reference_velocity": 4.2e-4}, 28.1, mass=0.33, velocity=0.036,
+        force=(-1.72, 0.777, 0.0), start=(0.0, -0.26), span=2.4,
+    )  # fmt: skip
+    scene["initial"]["contact_age"] = 0.43
+    loose, tight = outcome(scene, {"method": "implicit", "rtol": 9e-5, "certify": False}), outcome(scene, TIGHT)
+    assert float(loose.x_end) == pytest.approx(float(tight.x_end), rel=1e-4)
+    assert int(loose.steps) < 10_000

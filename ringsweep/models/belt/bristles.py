@@ -73,7 +73,7 @@ def _slip_on_bristle_belt(scene, y, v, forcing, angle):
 def _begin_record_on_bristle_belt(scene, t, seen):
     """Implement :func:`recorder.begin`, for the speed and the distance at which bristles yield."""
     # The body moves so far while its bristles go from one largest deflection to the other.
-    length, _, recoil = scales(scene.law, scene.mu_s, scene.body.gravity, scene.initial_z)
+    length, _, recoil, _ = scales(scene.law, scene.mu_s, scene.body.gravity, scene.initial_z)
     return record_at_launch(scene, t, seen, stick_speed(scene.law, recoil), 2.0 * length)
 
 
@@ -148,10 +148,10 @@ def _region_guards_on_bristle_belt(scene, mode, common, x):
 @implicit.error_scales.implements(BristleBelt)
 def _error_scales_on_bristle_belt(scene, tolerance, x):
     """Implement :func:`implicit.error_scales`, from the largest deflection that friction can hold."""
-    length, state, speed = scales(scene.law, scene.mu_s, scene.body.gravity, x[2])
+    length, state, speed, friction = scales(scene.law, scene.mu_s, scene.body.gravity, x[2])
     return (
         tolerance * (length_scale(scene, abs(x[1])) + length),
         tolerance * (abs(x[1]) + speed),
         tolerance * state,
-        tolerance * scene.mu_s * scene.body.gravity,
+        tolerance * friction * scene.body.gravity,
     )

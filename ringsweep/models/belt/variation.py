@@ -92,7 +92,7 @@ def _gradient_on_bristle_belt(scene, mode, guard, t, y, rates):
     by_v, by_z = 1.0, 0.0
     if ring.if_load_varies(scene.body, guard - 1, guard) == 1:
         law, mu_s, mu_k, sign, region = scene.law, scene.mu_s, scene.mu_k, float(mode.sign), mode.region
-        _, state, speed = scales(law, mu_s, scene.body.gravity, z)
+        _, state, speed, _ = scales(law, mu_s, scene.body.gravity, z)
         dv, dz = _SMALL * speed, _SMALL * state
         above = region_guard(law, mu_s, mu_k, v + dv, z, sign, region)
         by_v = (above - region_guard(law, mu_s, mu_k, v - dv, z, sign, region)) / (2.0 * dv)

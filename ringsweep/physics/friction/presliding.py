@@ -124,12 +124,12 @@ def initial_deflection(law, mu_s, mu_k):
     return 0.0
 
 
-@hook(optional=True)
+@hook(absorb=True, optional=True)
 def scales(law, mu_s, gravity, z):
-    """Units of errors: play of the contact, m, unit of the state z, and speed, m/s, as tuple.
+    """Units of errors: play of the contact, m; of the state z; speed, m/s; friction coefficient, 1.
 
-    By default both lengths are the deflection that carries the static friction. The speed is that of a body which these
-    bristles drive back.
+    By default both lengths are the deflection that carries the static friction, and the speed is that of a body which
+    these bristles drive back.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def scales(law, mu_s, gravity, z):
         State.
     """
     deflection = mu_s / law.sigma0
-    return deflection, deflection, mu_s * sqrt(gravity / law.sigma0)
+    return deflection, deflection, mu_s * sqrt(gravity / law.sigma0), mu_s
 
 
 @hook(optional=True)

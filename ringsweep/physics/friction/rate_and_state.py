@@ -34,8 +34,8 @@ _B = Annotated[Leaf, Parameter("1", "growth of friction with the logarithm of th
 _D_C = Annotated[Leaf, Parameter("m", "slip that renews the contacts, D_c", lower=0.0, open_lower=True)]
 _V_0 = Annotated[Leaf, Parameter("m/s", "speed of steady sliding with mu0, V_0", lower=0.0, open_lower=True)]
 
-# Speeds below this one count as this one in logarithms, m/s.
-_LEAST = 1e-300
+# Speeds below this share of the reference velocity count as this share in logarithms.
+_LEAST = 1e-290
 
 
 class Dieterich(NamedTuple):
@@ -59,7 +59,7 @@ class Ruina(NamedTuple):
 @absorbed
 def _speed(law, v):
     """Sliding speed in units of the reference velocity, not zero."""
-    return max(abs(v), _LEAST) / law.reference_velocity
+    return max(abs(v) / law.reference_velocity, _LEAST)
 
 
 @absorbed
@@ -107,8 +107,11 @@ def _steady_state(law, mu_s, mu_k, v):
 
 @scales.implements(Dieterich, Ruina)
 def _rate_and_state_scales(law, mu_s, gravity, z):
-    """Implement :func:`scales`: D_c, a factor of e in the age, and the speed of steady sliding at this age."""
-    return law.critical_distance, 1.0, law.reference_velocity * exp(-z)
+    """Implement :func:`scales`: D_c, a factor of e in the age, the speed that keeps this age, and the direct effect.
+
+    An error of friction that is not small beside `a` would be a factor of the speed.
+    """
+    return law.critical_distance, 1.0, law.reference_velocity * exp(-z), law.a
 
 
 @shown.implements(Dieterich, Ruina)
