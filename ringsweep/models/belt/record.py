@@ -22,7 +22,6 @@ from ringsweep.models.interface.status import BROKEN, COMPLETE, SEPARATED_1
 from ringsweep.models.turn import Interval, between, turn_within
 from ringsweep.numerics.functions import any_of, lanes_body, negated, select, square_root
 from ringsweep.numerics.memory import select_all
-from ringsweep.numerics.terms import joined
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import largest_force
@@ -250,14 +249,8 @@ def record_at_launch(scene, t, seen, band, play):
         shock.at_launch(acceleration),
         tangent.undisturbed(scene.asked, scene, t),
         (),
-        _no_impact(scene.stops),
+        (),
     )
-
-
-@feature("()")
-def _no_impact(stops):
-    """At the beginning of a run there has been no impact."""
-    return AtStop(0, 0.0, 0.0, 0.0, 0.0)
 
 
 @feature("0.0", absorb=True)
@@ -272,28 +265,10 @@ def _fastest(at_stop, fast, velocity):
     return max(fast, abs(velocity))
 
 
-@feature("False")
-def _stays(at_stop, belt_velocity):
-    """Whether a body rests at a stop, under which the belt slides along."""
-    return at_stop.rests != 0 and belt_velocity != 0.0
-
-
-@feature("velocity")
-def _at_end(at_stop, velocity):
-    """Velocity in space at the end of a run, m/s, which is exactly zero at a stop."""
-    return 0.0 if at_stop.rests != 0 else velocity
-
-
-@feature("False")
-def _ends_at_stop(at_stop):
-    """Whether a body that slides at a constant velocity cannot go on for ever."""
-    return True
-
-
-@feature("outcome")
-def _with_impacts(at_stop, outcome):
-    """Outcomes, and those of impacts."""
-    return joined(outcome, (at_stop.impacts, at_stop.speed_max))
+@feature("(False, False)", absorb=True)
+def _at_stops(at_stop):
+    """Whether a body cannot slide on for ever, since there are stops; and whether it rests at one."""
+    return True, at_stop.rests != 0
 
 
 @recorder.lend.implements(Belt, BristleBelt)
@@ -487,7 +462,7 @@ def _cycles(scene, r, stops, now, v, turn, span):
 @recorder.conclude.implements(Belt, BristleBelt)
 def _conclude_on_belt(scene, record, status, t, place, velocity):
     """Implement :func:`recorder.conclude`: the numbers of :class:`Outcome`, and what the scene asks for besides."""
-    r, x, velocity = record, place, _at_end(record.at_stop, velocity)
+    r, x = record, place
     if holds_in_band(scene.law) and r.band > 0.0:
         # The state holds the momentum, which moves nothing in a dead band.
         velocity = r.last.velocity
@@ -519,7 +494,7 @@ def _conclude_on_belt(scene, record, status, t, place, velocity):
         r.force_max,
         *shock.largest_jump(r.shocks),
     )
-    return _with_impacts(r.at_stop, tangent.with_exponent(r.tangent, outcome, period, scene))
+    return tangent.with_exponent(r.tangent, outcome, period, scene)
 
 
 @inlined
@@ -594,7 +569,8 @@ def _words(scene, r, t, of):
     if not forced and in_stop and rests and belt_velocity != 0.0:
         # The belt slides along under a body at rest, below the speed at which its friction no longer grows.
         return SLIDING, still, nan, 0.0, 0.0
-    if not forced and _stays(r.at_stop, belt_velocity):
+    between_stops, at_stop = _at_stops(r.at_stop)
+    if not forced and at_stop and belt_velocity != 0.0:
         return SLIDING, still, nan, 0.0, 0.0
     if in_stop and (for_good or stops.least < 0.0):
         motion = RIDING if stops.least < 0.0 else STICKING
@@ -605,7 +581,7 @@ def _words(scene, r, t, of):
         # There is no cycle, or none any more.
         if in_stop or (stops.slips > 0.0 and slips_since < natural):
             return STICK_SLIP, TRANSIENT, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan
-        if natural < inf or _ends_at_stop(r.at_stop):
+        if natural < inf or between_stops:
             far = max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
             steady = abs(r.last.velocity) * min(natural, scene.span) <= max(RETURN * far, _UNRESOLVED * abs(r.last.x))
         else:

@@ -84,8 +84,8 @@ class Mode(NamedTuple):
 # What does not know of the stops is that of the belt without them.
 for _hook in (
     *(modes.in_space, modes.row, series.state_at, series.rates_at, series.seen_at_start, series.seen_at),
-    *(series.extremes, audit.least_scales, audit.energy_of, audit.same_statistics, recorder.begin, recorder.lend),
-    *(recorder.observe, recorder.enter, recorder.conclude, implicit.to_implicit, implicit.from_implicit),
+    *(series.extremes, audit.least_scales, audit.energy_of, audit.same_statistics, recorder.lend),
+    *(recorder.observe, recorder.enter, implicit.to_implicit, implicit.from_implicit),
     *(implicit.error_scales, implicit.rates, implicit.linearise, implicit.seen, implicit.sought),
     *(slip, region_guards),
 ):
@@ -275,6 +275,21 @@ def _fill_at_rest(scene, mode, t, tolerance, c):
         c[row, 0] = 0.0
         _divide_by_time(c[row])
     return h, h
+
+
+@recorder.begin.implements(StopBelt)
+def _begin_record_between_stops(scene, t, seen):
+    """Implement :func:`recorder.begin`: there has been no impact."""
+    r = recorder.begin(scene.stops.free, t, seen)
+    return with_stop(r, AtStop(0, 0.0, 0.0, 0.0, 0.0), r.stops)
+
+
+@recorder.conclude.implements(StopBelt)
+def _conclude_between_stops(scene, record, status, t, place, velocity):
+    """Implement :func:`recorder.conclude`; at a stop the velocity is exactly zero."""
+    stop = record.at_stop
+    found = recorder.conclude(scene.stops.free, record, status, t, place, 0.0 if stop.rests != 0 else velocity)
+    return joined(found, (stop.impacts, stop.speed_max))
 
 
 @recorder.after_event.implements(StopBelt)
