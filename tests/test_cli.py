@@ -501,7 +501,7 @@ def test_json_of_a_sample_has_its_probabilities_as_numbers(folder, capsys):
         assert found["probability_low"][word] <= share <= found["probability_high"][word]
 
 
-def test_info_of_one_cell_of_a_sample_has_its_probabilities_and_coordinates(folder, capsys):
+def test_info_of_one_cell_of_a_sample_has_its_probabilities(folder, capsys):
     grid = "\n  grid: {friction.rest.mu_k: [0.05, 0.1]}\n"
     sample = "  sample: {n: 8, of: {drive.amplitude: {uniform: [0.5, 10]}}}\n"
     (folder / "case.yaml").write_text(f"{TEXT.partition(chr(10) + 'sweep:')[0]}\nsweep:{grid}{sample}")
