@@ -66,7 +66,7 @@ REFUSED = [
     ("run case.yaml --set friction.rest.mu_s=0", "case.yaml, line 8: scene.friction.rest.mu_k: 0.1 exceeds mu_s"),
     (
         "run case.yaml --set velocity=2",
-        "scene.velocity: unknown key: model belt has `belt.velocity` or",
+        "scene.velocity: unknown key; did you mean `drive.velocity`?",
     ),
     (
         "run case.yaml --set spring.stiffness=2",

@@ -190,7 +190,7 @@ class TestVelocity:
             np.testing.assert_allclose(series_of(a, t), expected, rtol=1e-10, atol=1e-13 * abs(expected).max())
         assert drives.period(a) == pytest.approx(drives.period(b))
 
-    def test_place_is_that_of_quadrature_where_a_velocity_rises_within_a_short_time(self):
+    def test_place_is_that_of_quadrature_where_a_velocity_rises_fast(self):
         section = {"law": "formula", "velocity": "V*(1 + tanh((t - t1)/w))/2", "V": 0.7, "t1": 1.0, "w": 0.02}
         drive = take(drive_of(section), 0)
         place, _ = quad(lambda t: drives.turn(drive, t)[1], 0.0, 1.7, points=[0.9, 1.0, 1.1], epsabs=1e-14)
