@@ -169,6 +169,12 @@ class TestMistakes:
             ({"stops": {"high": -0.1, "restitution": 0.5}}, {}, "scene.initial.x", "0 m is above stops.high"),
             ({"stops": {"high": 0.1}}, {}, "scene.stops.restitution", "missing"),
             ({"stops": {"high": 0.1, "restitution": 1.5}}, {}, "scene.stops.restitution", "1.5"),
+            (
+                {"body": {"mass": 1.0, "load": {"formula": "A*sin(w*t)", "A": 1.0, "w": 1.0}}},
+                {},
+                "scene.stops",
+                "body.load",
+            ),
             ({}, {"solver": {"method": "rk4", "steps": 100}}, "solver.method", "does not rebound from stops"),
             ({}, {"record": {"exponent": True}}, "record.exponent", "scene.stops"),
             ({"friction": {"law": "karnopp", "mu_s": 0.2, "mu_k": 0.1, "dead_band": 1e-3}}, {}, "scene.stops", "dead"),

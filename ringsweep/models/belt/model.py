@@ -439,6 +439,8 @@ class StopBelt(Belt):
             raise InputError(
                 "scene.stops", f"cannot stand beside the dead band of law {structure.law}: leave stops out"
             )
+        if structure.own_load is not None or structure.load is not None:
+            raise InputError("scene.stops", "cannot stand beside body.load, a load that varies in time: leave one out")
         if "stops.low" not in values and "stops.high" not in values:
             raise InputError("scene.stops", "low or high is missing: give one of them or both, such as `high: 2 cm`")
         free = super().build(replace(structure, impact=False), values)
