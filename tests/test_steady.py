@@ -105,6 +105,16 @@ class TestHopfBifurcation:
         slope = cell_of(launched(law, v_b=0.1)).law
         assert found.damper_coefficient.item() == pytest.approx(-G * stribeck(slope, 0.5, 0.3, 0.1)[1], rel=1e-3)
 
+    @pytest.mark.slow
+    def test_critical_stiffness_of_friction_that_ages_is_that_of_rice_and_ruina(self):
+        """k_c = F_N (b - a)/D_c (1 + m v^2/(F_N a D_c))."""
+        law = {"law": "dieterich", "mu0": 0.6, "a": 0.01, "b": 0.015}
+        law |= {"critical_distance": 1e-4, "reference_velocity": 1e-6}
+        for v_b in (1e-5, 1e-2):
+            found = self.found(launched(law, v_b=v_b, span=4e-3 / v_b), "spring.stiffness", (100.0, 20000.0))
+            exact = G * 0.005 / 1e-4 * (1.0 + v_b**2 / (G * 0.01 * 1e-4))
+            assert found.spring_stiffness.item() == pytest.approx(exact, rel=1e-5)
+
 
 @pytest.mark.parametrize(
     ("change", "message"),
@@ -113,6 +123,10 @@ class TestHopfBifurcation:
         ({"initial": {"steady": "stick"}}, r"initial\.steady: 'stick' is no steady motion \(known: slip\)"),
         ({"initial": {"steady": "slip", "x": 0.1}}, r"initial\.x: cannot stand beside initial\.steady"),
         ({"initial": {"steady": "slip", "velocity": 0.1}}, r"initial\.velocity: cannot stand beside initial\.steady"),
+        (
+            {"initial": {"steady": "slip", "contact_age": 1}},
+            r"initial\.contact_age: cannot stand beside",
+        ),
         ({"spring": {"stiffness": 0.0}}, r"initial\.steady: .*the spring cannot hold the body against 2\.943 N"),
         ({"spring": {"stiffness": 20.0, "cubic": -1e5}}, r"initial\.steady: .*cannot hold the body"),
         ({"body": {"mass": 1.0, "normal_stiffness": -1e3}, "force": {"constant": 1e3}}, r"normal load would be -"),

@@ -170,7 +170,7 @@ def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
     if not isinstance(initial, Mapping) or "steady" not in initial:
         return False
     one_of(initial["steady"], STEADY, "scene.initial.steady", "is no steady motion")
-    for name in ("x", "velocity", "deflection"):
+    for name in ("x", "velocity", "deflection", "contact_age"):
         if name in initial or f"initial.{name}" in swept:
             raise InputError(f"scene.initial.{name}", "cannot stand beside initial.steady, which gives it")
     return True

@@ -24,6 +24,12 @@ OUTCOMES = (
 #: Share of the span after which the exponent is measured, and number of blocks of the rest.
 _SKIPPED, _BLOCKS = 0.25, 24
 
+# Eigenvalues of a flow that contracts or expands by more than this share are not known.
+_LEAST = 1e-100
+
+# Relative error of an exponent of a body that rests.
+_COLLOCATION = 1e-6
+
 # Rounding of the logarithm of the growth between two observations.
 _ROUNDING = 2.0**-52
 
@@ -127,7 +133,7 @@ class Tangent(NamedTuple):
 
 
 _entered, _advanced = replacing("entry", "keeps"), replacing("step", "rates", "gradient")
-_with_gradient = replacing("gradient")
+_with_gradient, _with_blocks = replacing("gradient"), replacing("blocks")
 
 
 # ---- matrices -----------------------------------------------------------------------------------
@@ -378,6 +384,18 @@ def exponent(tangent):
     duration = b.t - b.first_t
     error = sqrt(b.squares / (b.number * (b.number - 1.0))) + _ROUNDING * tangent.observations / duration
     return (b.growth - b.first_growth) / duration, error
+
+
+@feature("tangent")
+def at_rest(tangent, duration):
+    """Tangent with one block: the present lap, of this duration (s), if the body has rested all the time."""
+    first, _, log_1, _, _, _ = _eigenvalues(tangent.vector, tangent.lap.matrix, tangent.lap.log_determinant)
+    if duration > 0.0 and _LEAST < first < 1.0 / _LEAST:
+        # The flow of one Jacobian has its exponents, however a disturbance swings.
+        rate = log_1 / duration
+        squares = 2.0 * (_COLLOCATION * rate) ** 2
+        return _with_blocks(tangent, Blocks(2.0, rate, squares, 0.0, 0.0, duration, log_1, inf))
+    return tangent
 
 
 @feature("outcome")

@@ -66,15 +66,20 @@ def along_implicit(asked, scene, record, start, taken, ends, scratch):
     if not high > low:
         return record
     forcing, x = start.forcing, start.x
-    for i in range(len(FEW)):
-        fraction = low + (high - low) * FEW[i]
-        t = later(start.now, fraction * taken.h)
-        forcing = drives.turn_near(scene.drive, scratch.course, start.now, fraction * taken.h)
-        x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
-        store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
-    # The last node is the end.
-    rates = implicit.rates(scene, start.mode, start.common, forcing, x)
-    return variation.propagate(scene, record, (high - low) * taken.h, rates, WEIGHTS_OF_FEW, work)
+    # Few nodes follow a turn of no more than a radian.
+    pieces = 1 + int((high - low) * taken.h * asked.frequency)
+    width = (high - low) / pieces
+    for piece in range(pieces):
+        for i in range(len(FEW)):
+            fraction = low + width * (piece + FEW[i])
+            t = later(start.now, fraction * taken.h)
+            forcing = drives.turn_near(scene.drive, scratch.course, start.now, fraction * taken.h)
+            x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
+            store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
+        # The last node is the end.
+        rates = implicit.rates(scene, start.mode, start.common, forcing, x)
+        record = variation.propagate(scene, record, width * taken.h, rates, WEIGHTS_OF_FEW, work)
+    return record
 
 
 @feature("record")

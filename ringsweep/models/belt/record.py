@@ -214,6 +214,9 @@ _LONGEST_PASSAGE = 0.1
 # The sliding velocity is zero within this share of its scale.
 _AT_REST = 1e-8
 
+# A body has rested if it has moved by less than this share of the way of its belt.
+_AT_ONE_PLACE = 1e-9
+
 # A turn counts if the body has moved farther than this share of the range of its displacement.
 _ROUNDING = 1e-6
 
@@ -463,6 +466,8 @@ def _cycles(scene, r, stops, now, v, turn, span):
 def _conclude_on_belt(scene, record, status, t, place, velocity):
     """Implement :func:`recorder.conclude`: the numbers of :class:`Outcome`, and what the scene asks for besides."""
     r, x = record, place
+    if r.x_max - r.x_min <= _AT_ONE_PLACE * abs(r.last.velocity - r.last.v) * t:
+        r = with_tangent(r, tangent.at_rest(r.tangent, t - r.cycles.reference.t))
     if holds_in_band(scene.law) and r.band > 0.0:
         # The state holds the momentum, which moves nothing in a dead band.
         velocity = r.last.velocity
