@@ -127,6 +127,7 @@ class TestHopfBifurcation:
             {"initial": {"steady": "slip", "contact_age": 1}},
             r"initial\.contact_age: cannot stand beside",
         ),
+        ({"body": {"mass": 1.0, "load": {"formula": "A*sin(w*t)", "A": 1, "w": 1}}}, "a normal load that does not"),
         ({"spring": {"stiffness": 0.0}}, r"initial\.steady: .*the spring cannot hold the body against 2\.943 N"),
         ({"spring": {"stiffness": 20.0, "cubic": -1e5}}, r"initial\.steady: .*cannot hold the body"),
         ({"body": {"mass": 1.0, "normal_stiffness": -1e3}, "force": {"constant": 1e3}}, r"normal load would be -"),

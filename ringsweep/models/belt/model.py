@@ -317,6 +317,8 @@ def _at_steady_slip(structure: Structure, values: Values, scene: Any) -> Any:
     velocity = values.get("belt.velocity", values.get("drive.amplitude"))
     if structure.drive not in ("none", "constant") or velocity is None:
         raise InputError(f"scene.{where}", "needs a belt of constant velocity: give belt.velocity")
+    if structure.own_load is not None or structure.load is not None:
+        raise InputError(f"scene.{where}", "needs a normal load that does not vary in time: leave body.load out")
     bristles = friction.family_of(law) is friction.Dynamic
     if bristles and (friction.TRAITS[law].snaps or steady_deflection.body_of(law) is None):
         raise InputError(f"scene.{where}", f"bristles of friction law {structure.law} have no steady deflection")
