@@ -464,7 +464,6 @@ class TestParts:
 
     #: Times of a table, and forces at these times.
     TIMES, FORCES = {"time": [0.0, 1.0, 2.0, 20.0]}, {"force": [1.0] * 4}
-    JUMP = "piecewise(t < t1, A, 0*A)"
 
     @pytest.mark.parametrize(
         ("force", "message"),
@@ -483,8 +482,10 @@ class TestParts:
             (TIMES | FORCES | {"interpolate": "spline"}, r"interpolate: 'spline' is no interpolation of a force"),
             ({"amplitude": 1.0, "frequency": 1.0, "interpolate": "linear"}, r"force\.time: missing: a table needs"),
             ({"formula": "A*sin(w*t)", "interpolate": "linear"}, r"interpolate: cannot stand beside"),
-            ({"formula": JUMP, "A": 1.0, "t1": 1.0}, r"force\.formula: .*the force jumps from 1 N to 0 N at t = 1 s"),
-            ({"formula": JUMP, "A": 1.0, "t1": 1.0}, "let it rise within a short time w, for example by the factor"),
+            (
+                {"formula": "A*sign(sin(w*t) - d)", "A": 1.0, "w": 1.0, "d": 0.2},
+                r"formula: .*its switches are not found",
+            ),
         ],
     )
     def test_force_that_makes_no_sense_is_refused_by_its_path(self, force, message):

@@ -116,13 +116,17 @@ def drive_of(structure: Structure, values: Values) -> Any:
         If the table of a drive ends before the span of time, or if the formula of a drive is not smooth.
     """
     if structure.table is None:
-        return by_formula(structure.drive_type, "drive", structure.drive_key, values)
+        # Neither bristles nor impacts take a jump of the sliding velocity.
+        smooth = structure.impact or friction.family_of(structure.law_type) is friction.Dynamic
+        return by_formula(structure.drive_type, "drive", structure.drive_key, values, smooth=smooth)
     columns = {field: values[f"drive.{field}"] for field in declared(structure.drive_type)}
     return table_of(*structure.table, columns["amplitude"], "drive", values)
 
 
-def by_formula(law: type, section: str, key: str, values: Values) -> Any:
+def by_formula(law: type, section: str, key: str, values: Values, *, smooth: bool = False) -> Any:
     """Drive or force with fields of shape ``(cells, ...)``; `key` of the `section` of a scene has its formula.
+
+    The velocity of a `smooth` drive must not jump.
 
     Raises
     ------
@@ -130,7 +134,8 @@ def by_formula(law: type, section: str, key: str, values: Values) -> Any:
         If the formula is not smooth.
     """
     try:
-        return drives.made(law, {name: values[f"{section}.{name}"] for name in declared(law)}, values["time.span"])
+        columns = {name: values[f"{section}.{name}"] for name in declared(law)}
+        return drives.made(law, columns, values["time.span"], smooth=smooth)
     except FormulaError as error:
         raise InputError(f"scene.{section}.{key}", f"{show(drives.FORMULAS[law].text)}: {error}") from None
 

@@ -45,6 +45,31 @@ _SPLIT = 134217729.0
 
 
 @absorbed
+def _lost(a, b, product):
+    """What rounding has taken from the product of two numbers."""
+    high_a, high_b = _SPLIT * a, _SPLIT * b
+    high_a, high_b = high_a - (high_a - a), high_b - (high_b - b)
+    low_a, low_b = a - high_a, b - high_b
+    return ((high_a * high_b - product) + high_a * low_b + low_a * high_b) + low_a * low_b
+
+
+@absorbed
+def turned(frequency, turns, share):
+    """The :class:`Instant` after a whole number of turns and a share of one, at a frequency in Hz."""
+    t = (turns + share) / frequency
+    product = frequency * t
+    rest = (((turns - product) + share) - _lost(frequency, t, product)) / frequency
+    rounded = t + rest
+    return Instant(rounded, rest - (rounded - t))
+
+
+@absorbed
+def is_after(a, b):
+    """Whether the :class:`Instant` `a` is after `b`."""
+    return a.t > b.t or (a.t == b.t and a.rest > b.rest)
+
+
+@absorbed
 def phase(frequency, t, rest, start):
     """Phase of an oscillation without its whole turns, rad; as exact in the millionth turn as in the first.
 
@@ -58,11 +83,7 @@ def phase(frequency, t, rest, start):
         Phase at t = 0, rad.
     """
     turns = frequency * t
-    a, b = _SPLIT * frequency, _SPLIT * t
-    a, b = a - (a - frequency), b - (b - t)
-    c, d = frequency - a, t - b
-    # What rounding has taken from the product.
-    error = ((a * b - turns) + a * d + c * b) + c * d
+    error = _lost(frequency, t, turns)
     # A sum with many turns in `start` would be rounded to what they resolve, differently at each time.
     start -= 2.0 * pi * nearest(start / (2.0 * pi))
     return 2.0 * pi * ((turns - nearest(turns)) + (error + frequency * rest)) + start

@@ -27,11 +27,12 @@ class Node:
     kind : str
         ``number``, ``symbol``, ``variable``, ``add``, ``multiply``, ``divide``, ``power``, a function (``exp``,
         ``log``, ``log1p``, ``sqrt``, ``tanh``, ``atan``, ``sin``, ``cos``), ``switch``; ``minimum`` or ``maximum`` of
-        constant parts.
+        constant parts; ``held``, a number that is constant between the thresholds of its function.
     parts : tuple of Node
         What the node is computed from. Of a switch, the expression below its threshold and the one above.
     value : float, str or int, optional
-        Value of a number, name of a symbol or of the variable, or index of the threshold of a switch.
+        Value of a number, name of a symbol or of the variable, or index of the threshold of a switch, or of a
+        held number.
     """
 
     kind: str
@@ -58,7 +59,7 @@ def _node(kind: str, *parts: Node, value: Any = None) -> Node:
 @cache
 def _varies(node: Node) -> bool:
     """Whether a node depends on the variable."""
-    return node.kind in ("variable", "switch") or any(_varies(part) for part in node.parts)
+    return node.kind in ("variable", "switch", "held") or any(_varies(part) for part in node.parts)
 
 
 #: The variable of friction laws and that of drives, both at least zero.
@@ -189,10 +190,15 @@ def switch(threshold: int, below: Node, above: Node) -> Node:
     return below if below is above else _node("switch", below, above, value=threshold)
 
 
+def held(index: int) -> Node:
+    """A number that is constant between thresholds, such as a whole part."""
+    return _node("held", value=index)
+
+
 @cache
 def derivative(a: Node, special: Callable[[Node], Node | None] = lambda a: None) -> Node:
     """Derivative by the variable; at a threshold the one from above. `special` gives that of some nodes."""
-    if not a.varies:
+    if not a.varies or a.kind == "held":
         return ZERO
     if a.kind == "variable":
         return ONE
@@ -306,7 +312,7 @@ def frequency(angle: Node) -> tuple[Node, Node, Node] | None:
         time is zero with that added.
     """
     rate = derivative(angle)
-    if rate.varies or any(node.kind == "switch" for node in nodes_of(angle)):
+    if rate.varies or any(node.kind in ("switch", "held") for node in nodes_of(angle)):
         return None
     shift, zeros = ZERO, {SPEED: ZERO, TIME: ZERO}
     shifted = [node for node in nodes_of(angle) if TIME in node.parts]
@@ -363,7 +369,7 @@ def evaluate(a: Node, variable: Any, values: Mapping[str, Any], thresholds: Any 
     values : mapping of str to array_like
         Values of the parameters.
     thresholds : sequence of array_like
-        Value of the variable at each threshold.
+        Value of the variable at each threshold, or the held number.
 
     Returns
     -------
@@ -385,6 +391,8 @@ def _value_of(node: Node, parts: list[Any], variable: Any, values: Mapping[str, 
         return np.asarray(values[node.value], dtype=np.float64)
     if node.kind == "variable":
         return np.asarray(variable, dtype=np.float64)
+    if node.kind == "held":
+        return np.asarray(thresholds[node.value], dtype=np.float64)
     if node.kind == "switch":
         return np.where(np.asarray(variable) < thresholds[node.value], *parts)
     simple: dict[str, Any] = {"add": np.add, "multiply": np.multiply, "divide": np.divide, "power": np.power}

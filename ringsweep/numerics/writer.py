@@ -82,6 +82,8 @@ class _Writer:
             return self.names[node.value]
         if node.kind == "variable":
             return "now" if node is TIME else str(node.value)
+        if node.kind == "held":
+            return f"drive.held[{node.value}]"
         if node.kind in ("sin", "cos") and (turning := frequency(node.parts[0])) is not None:
             _straight(self, list(turning))
             turns, shift, start = (self.known[part] for part in turning)
@@ -466,7 +468,7 @@ SERIES_ROWS = 36
 @cache
 def _degree(node: Node) -> int | None:
     """Degree of a polynomial, at most 4; None for a higher one and for anything else."""
-    if not node.varies:
+    if not node.varies or node.kind == "held":
         return 0
     if node.kind == "variable":
         return 1

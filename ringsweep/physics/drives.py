@@ -11,7 +11,7 @@ rad.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import atan, cos, exp, inf, log, log1p, nan, sin, sqrt, tanh
+from math import atan, cos, exp, floor, inf, log, log1p, nan, sin, sqrt, tanh
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -23,12 +23,13 @@ from ringsweep.numerics.expressions import ZERO, Node, derivative, evaluate, sym
 from ringsweep.numerics.functions import raised
 from ringsweep.numerics.rows import distinct_rows
 from ringsweep.numerics.series import INVERSE
-from ringsweep.physics import functions_of_time
 from ringsweep.physics.definitions import Definitions
 from ringsweep.physics.friction.formula import FormulaError
 from ringsweep.physics.functions_of_time import (
     Function,
     check,
+    extremes,
+    held_at,
     knots_of,
     period_of,
     read_function,
@@ -87,7 +88,10 @@ def shape_numbers(drive: Any) -> list[Any]:
     function = FORMULAS.get(type(drive))
     if function is not None:
         needed = symbols_of(function.factors[1], function.shape_rate)
-        return [getattr(drive, name) for name in needed] + list(getattr(drive, "knots", np.empty((0, 0))).T)
+        knots = getattr(drive, "knots", None)
+        return [getattr(drive, name) for name in needed] + (
+            [] if knots is None else list(knots.reshape(len(knots), -1).T)
+        )
     for name, part in zip(drive._fields, drive, strict=True):
         if isinstance(part, tuple):
             found += shape_numbers(part)
@@ -315,11 +319,79 @@ def _next_knot_of_table(drive, t):
     return drive.knots[j + 1] if j + 2 < len(drive.knots) else inf
 
 
+@hook(absorb=True, optional=True)
+def knot_after(drive, t):
+    """What :func:`next_knot` returns, as an :class:`ringsweep.numerics.clock.Instant` after the instant `t`."""
+    return clock.Instant(next_knot(drive, t.t), 0.0)
+
+
+@hook(absorb=True, optional=True)
+def held_of(drive):
+    """Arrays of the numbers that are constant between knots; an empty tuple if the drive has none."""
+    return ()
+
+
+@hook(optional=True)
+def pass_knot(drive, t):
+    """Give what is constant between knots its values from the time `t`, s, on; return whether any of them changes."""
+    return False
+
+
+@hook(optional=True)
+def least_jump(drive):
+    """Jumps of the speed below this are rounding, in the units of :func:`turn`."""
+    return 0.0
+
+
+@inlined
+def _piece_at(knots, now):
+    """Held number of a threshold at and after an instant, and the instant of its next knot.
+
+    `knots` are those of the threshold, see :func:`ringsweep.physics.functions_of_time.knots_of`.
+    """
+    frequency, held = knots[0, 0], nan
+    # The turn before may be the present one but for rounding.
+    turn = floor(frequency * now.t) - 2.0
+    while True:
+        for j in range(1, knots.shape[1]):
+            share = knots[0, j]
+            if share == inf:
+                break
+            knot = clock.turned(frequency, turn, share) if frequency > 0.0 else clock.Instant(share, 0.0)
+            if clock.is_after(knot, now):
+                return held, knot
+            held = knots[1, j] + (knots[1, 0] * turn if frequency > 0.0 else 0.0)
+        if frequency == 0.0:
+            return held, clock.Instant(inf, 0.0)
+        turn += 1.0
+
+
+@inlined
+def _next_of(knots, now):
+    """Instant of the next knot of all thresholds."""
+    found = clock.Instant(inf, 0.0)
+    for i in range(len(knots)):
+        _, knot = _piece_at(knots[i], now)
+        if clock.is_after(found, knot):
+            found = knot
+    return found
+
+
+@inlined
+def _hold(held, knots, now):
+    """Fill the numbers that are held from an instant on, and return whether any of them changes."""
+    changed = False
+    for i in range(len(held)):
+        before = held[i]
+        held[i], _ = _piece_at(knots[i], now)
+        changed = changed or held[i] != before
+    return changed
+
+
 def angle_at_start(drive):
     """Angle of the ring at t = 0, rad; outside kernels, for arrays of shape ``(cells,)``."""
     if (function := FORMULAS.get(type(drive))) is not None:
-        knots = list(getattr(drive, "knots", np.empty((0, 0))).T)
-        return evaluate(function.value, 0.0, drive._asdict(), knots)
+        return evaluate(function.value, 0.0, drive._asdict(), getattr(drive, "held", np.empty((0, 0))).T)
     return np.array([turn(take(drive, i), 0.0)[0] for i in range(len(drive[0]))])
 
 
@@ -591,11 +663,14 @@ _SCOPE = {
     "atan_of": atan,
     "cos_of": cos,
     "exp_of": exp,
+    "hold": _hold,
     "inf": inf,
+    "Instant": clock.Instant,
     "INVERSE": INVERSE,
     "log1p_of": log1p,
     "log_of": log,
     "nan": nan,
+    "next_of": _next_of,
     "parts": clock.parts,
     "phase": clock.phase,
     "shifted_phase": clock.shifted_phase,
@@ -606,7 +681,7 @@ _SCOPE = {
     "time_of": _time_of,
 }
 
-_SIDE = "now < drive.knots[{}]"
+_SIDE = "drive.held[{}] > 0.0"
 
 # Lines that give a time the two names that expressions have for it.
 _TIME = ["now, rest = parts(t)"]
@@ -615,7 +690,8 @@ _TIME = ["now, rest = parts(t)"]
 def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Parameter], qualified: str = "") -> type:
     """Type of the drive with a formula: a ``NamedTuple`` of its parameters, and of its knots if it has any."""
     fields: list[Any] = [(field, Annotated[Leaf, p]) for field, p in parameters.items()]
-    drive: Any = NamedTuple(name, [*fields, *([("knots", Any)] if function.knots else [])])  # type: ignore[misc]
+    fields += [("knots", Any), ("held", Any), ("least", Any)] * bool(function.knots)
+    drive: Any = NamedTuple(name, fields)  # type: ignore[misc]
     drive.__doc__, drive.__module__, drive.__qualname__ = doc, __name__, qualified or name
     FORMULAS[drive] = function
     names = {field: f"drive.{field}" for field in parameters}
@@ -639,10 +715,15 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
     implement(top_speed, "drive", ["now = rest = 0.0", *number(size_at_start(function.rate))])
     # The drives of the package have no narrow features.
     reach = writer.reach_lines(names, rate if function.by_rate else s, _SIDE) if qualified else []
-    if function.knots or reach:
-        lines = [*_TIME, "h = inf", *reach, "found = t + h"]
-        lines += ["for knot in drive.knots:", "    if t < knot < found:", "        found = knot"] * bool(function.knots)
-        implement(next_knot, "drive, t", [*lines, "return found"])
+    if function.knots:
+        implement(held_of, "drive", ["return (drive.held,)"])
+        implement(pass_knot, "drive, t", [*_TIME, "return hold(drive.held, drive.knots, Instant(now, rest))"])
+        implement(least_jump, "drive", ["return drive.least"])
+        lines = [*_TIME, "h = inf", *reach, "knot = next_of(drive.knots, Instant(now, rest))"]
+        implement(knot_after, "drive, t", [*lines, "return knot if knot.t <= t.t + h else Instant(t.t + h, 0.0)"])
+        implement(next_knot, "drive, t", [*lines, "return min(t + h, knot.t)"])
+    elif reach:
+        implement(next_knot, "drive, t", [*_TIME, "h = inf", *reach, "return t + h"])
     elif writer.is_polynomial(rate):
         turn_near.implements(drive)(_turn_near_of_table)
     period.implements(drive)(lambda drive: period_of(function.rate, drive._asdict()))
@@ -694,11 +775,11 @@ add_drive("table", Table)
 
 # ---- drives of users --------------------------------------------------------------------------
 
-#: What must be continuous, by the unit of the formula.
+#: What must be continuous, by the unit of the formula; the second one only if the velocity must not jump.
 _CONTINUOUS = {
     "rad": (("the angle", "rad"), ("the angular velocity", "rad/s")),
     "m": (("the displacement", "m"), ("the velocity", "m/s")),
-    "N": (("the force", "N"),),
+    "N": (),
 }
 
 
@@ -748,8 +829,10 @@ _DEFINITIONS = Definitions(__name__, _defined)
 __getattr__ = _DEFINITIONS.find
 
 
-def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np.float64]) -> Any:
+def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np.float64], *, smooth: bool) -> Any:
     """Drives by formula, of shape ``(cells,)``, with their knots; `columns` are parameters by name, `spans` in s.
+
+    If the motion must be `smooth`, the velocity of the drive must not jump.
 
     Raises
     ------
@@ -759,14 +842,18 @@ def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np
     if drive.__qualname__ not in _DEFINITIONS.known:
         return drive(**columns)
     function = FORMULAS[drive]
-    knots = knots_of(function, columns, len(spans))
+    knots = knots_of(function, columns, spans)
     some, _ = distinct_rows([*columns.values(), spans])
     values = {name: column[some] for name, column in columns.items()}
-    check(function, values, knots[some], spans[some], _CONTINUOUS[function.unit])
-    return drive(**columns, knots=knots) if function.knots else drive(**columns)
+    check(function, values, knots[some], spans[some], _CONTINUOUS[function.unit][: 2 if smooth else 1])
+    if not function.knots:
+        return drive(**columns)
+    held = np.ascontiguousarray(np.stack(held_at(knots, np.zeros(len(spans))), axis=1))
+    least = 1e-9 * abs(extremes(function.rate, columns, knots, spans)).max(axis=0)
+    return drive(**columns, knots=knots, held=held, least=least)
 
 
-def extremes(force: Any, spans: NDArray[np.float64]) -> Any:
+def extremes_of(force: Any, spans: NDArray[np.float64]) -> Any:
     """About the least and the greatest value of forces by formula within spans of time (s), N, shape ``(2, cells)``."""
-    knots = getattr(force, "knots", np.empty((len(spans), 0)))
-    return functions_of_time.extremes(FORMULAS[type(force)], force._asdict(), knots, spans)
+    knots = getattr(force, "knots", np.empty((len(spans), 0, 2, 1)))
+    return extremes(FORMULAS[type(force)].value, force._asdict(), knots, spans)

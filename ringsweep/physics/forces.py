@@ -12,7 +12,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from ringsweep.compile import feature, hook
-from ringsweep.numerics.clock import later
+from ringsweep.numerics.clock import is_after, later
+from ringsweep.numerics.terms import joined
 from ringsweep.physics import drives
 from ringsweep.physics.functions_of_time import common_period
 from ringsweep.quantities.parameters import Leaf, Parameter
@@ -206,6 +207,32 @@ def _next_knot_of_forced(drive, t):
     return min(drives.next_knot(drive.motion, t), drives.next_knot(drive.force, t))
 
 
+@drives.knot_after.implements(Forced)
+def _knot_after_of_forced(drive, t):
+    """Implement :func:`drives.knot_after`."""
+    of_motion, of_force = drives.knot_after(drive.motion, t), drives.knot_after(drive.force, t)
+    return of_force if is_after(of_motion, of_force) else of_motion
+
+
+@drives.held_of.implements(Forced)
+def _held_of_forced(drive):
+    """Implement :func:`drives.held_of`: of both."""
+    return joined(drives.held_of(drive.motion), drives.held_of(drive.force))
+
+
+@drives.pass_knot.implements(Forced)
+def _pass_knot_of_forced(drive, t):
+    """Implement :func:`drives.pass_knot`: of both."""
+    of_motion = drives.pass_knot(drive.motion, t)
+    return drives.pass_knot(drive.force, t) or of_motion
+
+
+@drives.least_jump.implements(Forced)
+def _least_jump_of_forced(drive):
+    """Implement :func:`drives.least_jump`: of the motion."""
+    return drives.least_jump(drive.motion)
+
+
 @drives.beginning.implements(Forced)
 def _beginning_of_forced(drive):
     """Implement :func:`drives.beginning`: of the motion."""
@@ -264,6 +291,32 @@ def _expand_motion_of_laden(drive, t, order, theta, work):
 def _jerk_of_laden(drive, t):
     """Implement :func:`drives.jerk`: of the motion."""
     return drives.jerk_at(drive.forced, t)
+
+
+@drives.knot_after.implements(Laden)
+def _knot_after_of_laden(drive, t):
+    """Implement :func:`drives.knot_after`."""
+    of_motion, of_load = drives.knot_after(drive.forced, t), drives.knot_after(drive.load, t)
+    return of_load if is_after(of_motion, of_load) else of_motion
+
+
+@drives.held_of.implements(Laden)
+def _held_of_laden(drive):
+    """Implement :func:`drives.held_of`: of all."""
+    return joined(drives.held_of(drive.forced), drives.held_of(drive.load))
+
+
+@drives.pass_knot.implements(Laden)
+def _pass_knot_of_laden(drive, t):
+    """Implement :func:`drives.pass_knot`: of all."""
+    of_motion = drives.pass_knot(drive.forced, t)
+    return drives.pass_knot(drive.load, t) or of_motion
+
+
+@drives.least_jump.implements(Laden)
+def _least_jump_of_laden(drive):
+    """Implement :func:`drives.least_jump`: of the motion."""
+    return drives.least_jump(drive.forced)
 
 
 @drives.next_knot.implements(Laden)

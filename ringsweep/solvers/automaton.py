@@ -234,8 +234,8 @@ _history_row = either(_row_of_series, _row_in_implicit_step)
 
 @inlined
 def _until(limit, now):
-    """Time from the instant `now` to the time `limit`, s."""
-    return (limit - now.t) - now.rest
+    """Time from the instant `now` to the instant `limit`, s."""
+    return (limit.t - now.t) + (limit.rest - now.rest)
 
 
 @inlined
@@ -243,7 +243,7 @@ def _after_step(scene, mode, guard, now, s, limit, y):
     """``(now, status, mode, y)`` after a step of length `s`, at most up to `limit`, that `guard` ended (-1: none)."""
     # The sum of steps must not miss the end of the span, or a knot of the drive, by rounding.
     if s >= 0.0:
-        now = later(now, s) if s < _until(limit, now) else Instant(limit, 0.0)
+        now = later(now, s) if s < _until(limit, now) else limit
     if not (isfinite(y[0]) and isfinite(y[1])):
         return now, BROKEN, mode, y
     if not s >= 0.0:
@@ -261,6 +261,24 @@ def _copy_into(row, values):
     """Copy a tuple of numbers into the first columns of a row."""
     for k in range(len(values)):
         row[k] = values[k]
+
+
+@feature("(False, RUNNING, mode, y)")
+def _pass_knot(held, scene, course, mode, now, y):
+    """Whether force or drive switch at an instant; status, mode and state from then on.
+
+    `held` is what :func:`ringsweep.physics.drives.held_of` returns. The velocity of the drive may jump; the body keeps
+    its velocity in space.
+    """
+    before = drives.turn(scene.drive, now)[1]
+    if not drives.pass_knot(scene.drive, now):
+        return False, RUNNING, mode, y
+    drives.new_course(course)
+    jump = drives.turn(scene.drive, now)[1] - before
+    if abs(jump) <= drives.least_jump(scene.drive):
+        return True, RUNNING, mode, y
+    status, mode, y = modes.after_jump(scene, mode, now, y, jump)
+    return True, status, mode, y
 
 
 class History(NamedTuple):
@@ -358,6 +376,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
     for i in range(len(steps)):
         scene = take(batch, i)
         drives.new_course(scratch.course)
+        drives.pass_knot(scene.drive, Instant(0.0, 0.0))
         t, y, status, mode = modes.begin(scene)
         now = Instant(t, 0.0)
         begun = _begin_record(family(scene.law), scene, mode, now, y, tolerances, c)
@@ -385,7 +404,8 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                 t_judged = t
             t_before = t
             n += 1
-            limit = within_turn(variation.asked(scene), t, min(scene.span, drives.next_knot(scene.drive, t)))
+            limit, knot = within_turn(variation.asked(scene), t, scene.span), drives.knot_after(scene.drive, now)
+            limit = knot if knot.t < limit else Instant(limit, 0.0)
             h_max = _until(limit, now)
             control = _with_length(control, min(control.h, spacing))
             run = Run(record, mode, now, y, control, local, just_switched)
@@ -405,6 +425,9 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
             now, status, mode, y = _after_step(scene, mode, guard, now, s, limit, y_next)
+            if status == RUNNING and _until(limit, now) == 0.0:
+                is_knot, status, mode, y = _pass_knot(drives.held_of(scene.drive), scene, scratch.course, mode, now, y)
+                just_switched = just_switched or is_knot
             if guard >= 0:
                 record = at_event(variation.asked(scene), scene, record, step.mode, guard, now, y_next)
                 record = recorder.after_event(scene, record, step.mode, mode, now.t)

@@ -26,7 +26,7 @@ from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, side_by_side, size_of, write
 from ringsweep.numerics.rows import distinct_rows
-from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, without_shape
+from ringsweep.physics.drives import lookup, pass_knot, shape_numbers, table_row, turn, without_shape
 from ringsweep.physics.friction import TRAITS
 from ringsweep.quantities.flags import CERTIFIED, COARSE, FAILED, NO_RESULT, NOT_ASKED, SEPARATING
 from ringsweep.quantities.parameters import Parameter
@@ -275,6 +275,7 @@ class _End(NamedTuple):
 def _fill_table(table, drive, first, steps, h):
     """Fill `table` with the shape of the drive and its rate, at whole and half steps from step `first` on."""
     for k in range(2 * steps + 1):
+        pass_knot(drive, (first + 0.5 * k) * h)
         row = table_row(drive, (first + 0.5 * k) * h)
         for column in range(len(row)):
             table[k, column] = row[column]

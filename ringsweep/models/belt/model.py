@@ -286,7 +286,7 @@ class Belt(Model, Continues):
             largest = abs(factor) * np.abs(structure.force[1]).max()
         elif structure.own_force is not None:
             force = by_formula(structure.own_force, "force", "formula", values)
-            largest = abs(drives.extremes(force, values["time.span"])).max(axis=0)
+            largest = abs(drives.extremes_of(force, values["time.span"])).max(axis=0)
         elif given:
             for name, example in (("amplitude", "1 N"), ("frequency", "1 Hz")):
                 if name not in given:
@@ -368,7 +368,7 @@ def _with_load(drive: Any, structure: Structure, values: Values) -> tuple[forces
     else:
         assert structure.own_load is not None
         load = by_formula(structure.own_load, "body.load", "formula", values)
-        ends = drives.extremes(load, values["time.span"])
+        ends = drives.extremes_of(load, values["time.span"])
     return forces.Laden(drive, load, drive.largest, ends.min(axis=0)), abs(ends).max(axis=0)
 
 

@@ -96,18 +96,32 @@ def _table_shape_on_belt(scene):
 @modes.begin.implements(belt.Belt)
 def _begin_on_belt(scene):
     """Implement :func:`modes.begin`; the state is ``(x, v)``."""
-    t, x = drives.beginning(scene.drive), scene.initial_x
-    v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
+    t, v = drives.beginning(scene.drive), drives.velocity_at_beginning(scene.drive, scene.initial_v)
+    status, mode = _mode_at(scene, Instant(t, 0.0), scene.initial_x, v)
+    return t, (scene.initial_x, v), status, mode
+
+
+@modes.after_jump.implements(belt.Belt)
+def _after_jump_on_belt(scene, mode, t, y, jump):
+    """Implement :func:`modes.after_jump`."""
+    x, v = y[0], y[1] - jump
+    status, mode = _mode_at(scene, t, x, v)
+    return status, mode, (x, v)
+
+
+@inlined
+def _mode_at(scene, t, x, v):
+    """Status and mode of a body at a place, m, with a sliding velocity, m/s."""
     laden = belt.laden_at(scene.drive, scene, t)
     status, mode = RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
     if ring.if_load_varies(scene.body, True, False) and ring.reactions(laden.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
         status, mode = SEPARATED_1, Mode(0, KINETIC, -1)
     elif holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
-        mode = mode_at_rest(scene, Instant(t, 0.0), x)
+        mode = mode_at_rest(scene, t, x)
     elif v == 0.0:
         pull = stuck_pull(scene, x, v, drives.turn(scene.drive, t))
         mode = Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
-    return t, (x, v), status, mode
+    return status, mode
 
 
 @inlined

@@ -63,6 +63,25 @@ def switch(scene, mode, guard, t, y):
 
 
 @hook(optional=True)
+def after_jump(scene, mode, t, y, jump):
+    """What follows after the velocity of the drive has jumped.
+
+    Parameters
+    ----------
+    scene, mode, t, y : NamedTuple, NamedTuple, Instant, tuple of float
+        As for :func:`switch`.
+    jump : float
+        Jump of the velocity of the drive, rad/s or m/s.
+
+    Returns
+    -------
+    tuple
+        As for :func:`switch`. By default the run fails: other scenes take no such drive.
+    """
+    return BROKEN, mode, y
+
+
+@hook(optional=True)
 def is_lost(scene, t, s):
     """Whether a step of length `s` from the time `t`, both in s, counts as none; a run ends after hundreds of them.
 

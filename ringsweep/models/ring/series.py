@@ -144,6 +144,13 @@ def _begin_on_ring(scene):
     return t, (phi, v), status, mode
 
 
+@modes.after_jump.implements(ring.Ring)
+def _after_jump_on_ring(scene, mode, t, y, jump):
+    """Implement :func:`modes.after_jump`."""
+    status, mode, v = mode_at(scene, t, y[0], y[1] - jump * scene.body.radius)
+    return status, mode, (y[0], v)
+
+
 @feature("False", of=drives.Power)
 def _is_jerked(drive, scene, t, v):
     """Whether `v` comes only from an infinite acceleration of the ring at t = 0, before which the body was at rest."""

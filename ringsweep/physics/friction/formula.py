@@ -14,7 +14,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -319,23 +319,23 @@ class Reader:
             raise FormulaError(f"{_shown(tree)}: write {example}")
         condition, first, *rest = tree.args
         limit, lower = self._limit(condition)
-        index = self._index(Threshold(limit, within=within))
+        index = self._index(replace(limit, within=within))
         one = self.visit(first, (*within, (index, lower)))
         last = (*within, (index, not lower))
         other = self.visit(rest[0] if len(rest) == 1 else ast.Call(ast.Name("piecewise"), rest, []), last)
         return expressions.switch(index, one, other) if lower else expressions.switch(index, other, one)
 
-    def _limit(self, condition: ast.expr) -> tuple[Node, bool]:
-        """What a condition compares the variable with, and whether the condition holds below it."""
+    def _limit(self, condition: ast.expr) -> tuple[Threshold, bool]:
+        """Threshold of a condition, and whether the condition holds below it."""
         if isinstance(condition, ast.Compare) and len(condition.ops) == 1:
             left, right = condition.left, condition.comparators[0]
             less = isinstance(condition.ops[0], ast.Lt | ast.LtE)
             if less or isinstance(condition.ops[0], ast.Gt | ast.GtE):
                 a, b = self.visit(left, ()), self.visit(right, ())
                 if a is self.language.variable and not b.varies:
-                    return b, less
+                    return Threshold(b), less
                 if b is self.language.variable and not a.varies:
-                    return a, not less
+                    return Threshold(a), not less
         x = self.language.name
         raise FormulaError(f"{_shown(condition)}: a condition compares {x} with a parameter, such as {x} < {x}1")
 
@@ -413,6 +413,9 @@ class Units:
                 return self._alike([*arguments[1::2], arguments[-1]], tree)
             case ast.Call(func=ast.Name(id="min" | "max" | "abs"), args=[*arguments]):
                 return self._alike(arguments, tree)
+            case ast.Call(func=ast.Name(id="sign"), args=[inner]):
+                self.visit(inner)
+                return _NONE
             case ast.Call(func=ast.Name(id="sqrt"), args=[inner]):
                 return _times(_NONE, self.visit(inner), Fraction(1, 2))
             case ast.Call(func=ast.Name(id=name), args=[inner]):

@@ -1,0 +1,93 @@
+"""Forces and motions that jump: steps, square waves and kinks, against motions in closed form."""
+
+from fractions import Fraction
+from itertools import pairwise
+from math import atan2, copysign, cos, exp, floor, pi, sin, sqrt
+
+import numpy as np
+import pytest
+from test_functions_of_time import belt, by, cells_of
+
+import ringsweep
+from ringsweep.compile import take
+from ringsweep.numerics.clock import Instant
+from ringsweep.physics import drives
+
+G = 9.81
+
+
+def moved(x, v, F, span, *, k, c, static, kinetic):
+    """Place and velocity of a mass of 1 kg on a floor with friction after a time under a constant force."""
+    while span > 0.0:
+        if v == 0.0 and abs(F - k * x) <= static:
+            return x, v
+        side = copysign(1.0, v if v != 0.0 else F - k * x)
+        center, decay = (F - side * kinetic) / k, 0.5 * c
+        u, rate = x - center, sqrt(k - decay * decay)
+        stop = atan2(v * rate, decay * v + k * u) % pi / rate if v != 0.0 else pi / rate
+        s = min(stop, span)
+        C, S, fallen = cos(rate * s), sin(rate * s) / rate, exp(-decay * s)
+        x, v = center + fallen * (u * C + (v + decay * u) * S), fallen * (v * C - (decay * v + k * u) * S)
+        v = 0.0 if s == stop else v
+        span -= s
+    return x, v
+
+
+@pytest.mark.slow
+def test_step_and_square_wave_move_a_body_as_the_closed_form_says():
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        k, c, A, B, w, p, t1 = rng.uniform([1, 0, 0.5, -4, 1, -9, 0.5], [20, 1, 5, 4, 7, 9, 4])
+        static = rng.uniform(0.05, 0.3)
+        kinetic = static * rng.uniform(0.3, 1.0)
+        x, v, span = rng.uniform(-0.5, 0.5), rng.uniform(-1.0, 1.0), 9.0
+        force = {"formula": "A*sign(sin(w*t + p)) + piecewise(t < t1, 0, B)", "A": A, "B": B, "w": w, "p": p, "t1": t1}
+        scene = belt(None, force, {"law": "stiction", "mu_s": static, "mu_k": kinetic})
+        scene |= {"spring": {"stiffness": k}, "damper": {"coefficient": c}, "initial": {"x": x, "velocity": v}}
+        run = ringsweep.simulate(scene | {"time": {"span": span}}, samples=2)
+        turns = [(n * pi - p) / w for n in range(floor(p / pi), 40)]
+        knots = [0.0, *sorted(t for t in [*turns, t1] if 0.0 < t < span), span]
+        for t, end in pairwise(knots):
+            middle = 0.5 * (t + end)
+            F = A * copysign(1.0, sin(w * middle + p)) + (B if middle > t1 else 0.0)
+            x, v = moved(x, v, F, end - t, k=k, c=c, static=static * G, kinetic=kinetic * G)
+        assert run.certified == 1
+        np.testing.assert_allclose([run.x_end, run.velocity_end], [x, v], atol=1e-8)
+
+
+@pytest.mark.slow
+def test_body_keeps_its_velocity_where_that_of_the_belt_jumps():
+    drive = by("a*max(t - t1, 0)", a=0.4, t1=0.5)
+    scene = belt(drive, None, {"law": "stiction", "mu_s": 0.3, "mu_k": 0.2}) | {"spring": {"stiffness": 0.0}}
+    run = ringsweep.simulate(scene | {"time": {"span": 2.0}}, samples=4)
+    slip = 0.4 / (0.2 * G)
+    assert run.certified == 1
+    assert float(run.velocity_end) == pytest.approx(0.4, abs=1e-12)
+    assert float(run.x_end) == pytest.approx(0.4 * (1.5 - slip) + 0.5 * 0.2 * G * slip**2, abs=1e-10)
+    # The instant of the jump has a row on either side.
+    assert run["mode"].values[run.time.values == 0.5].tolist() == [0, -1]
+
+
+def test_millionth_knot_is_as_exact_as_the_first():
+    force = {"formula": "A*sign(sin(w*t + p))", "A": 1.0, "w": 7.3, "p": 0.4}
+    drive = take(cells_of(belt(None, force)), 0).drive.force
+    turns, share = drive.knots[0, 0, 0], drive.knots[0, 0, 1]
+    for n in (1, 10**6, 10**9):
+        exact = (n + Fraction(share)) / Fraction(turns)
+        knot = drives.knot_after(drive, Instant(float(exact) - 1e-3, 0.0))
+        assert abs(Fraction(knot.t) + Fraction(knot.rest) - exact) < Fraction(n, 10**29)
+
+
+@pytest.mark.parametrize(
+    ("text", "period"),
+    [
+        ("A*sign(sin(w*t))", pi),
+        ("A*max(0, sin(w*t)) + A*abs(cos(3*w*t))", pi),
+        ("A*sin(2*pi*floor(w*t/pi)/4)", np.inf),
+        ("A*sign(t - T)", np.inf),
+    ],
+)
+def test_switches_of_sines_have_the_period_of_these(text, period):
+    known = {"A": 1.0, "w": 2.0, "T": 3.0}
+    force = {"formula": text, **{name: known[name] for name in known if name in text}}
+    assert np.broadcast_to(cells_of(belt(None, force)).forcing_period, 1) == pytest.approx(period)
