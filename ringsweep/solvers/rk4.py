@@ -414,7 +414,10 @@ def prepare(batch: Any) -> tuple[Any, Any]:
 def _launch(batch, launches):
     """Fill `launches`, one array for each component, with the initial states."""
     for cell in range(len(launches[0])):
-        put(launches, cell, constant_step.initial_state(take(batch, cell)))
+        scene = take(batch, cell)
+        # A run before this one has left its last piece.
+        pass_knot(scene.drive, 0.0)
+        put(launches, cell, constant_step.initial_state(scene))
 
 
 def integrate(
