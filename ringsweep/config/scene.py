@@ -17,7 +17,7 @@ from ringsweep.config.sections import choose, missing_text, one_of, section_of, 
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
-from ringsweep.models.scene import ELSEWHERE, LAW, WAYS, Scene, Structure
+from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS, Scene, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.formula import COEFFICIENTS, NAMES
@@ -161,6 +161,7 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
         own_load=own.force_type(body.get("load"), "body.load") if isinstance(body := scene.get("body"), dict) else None,
         steady=_starts_steadily(scene, swept),
         two_way=_two_way(scene, swept),
+        frame=_frame(scene),
     )
 
 
@@ -174,6 +175,13 @@ def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
         if name in initial or f"initial.{name}" in swept:
             raise InputError(f"scene.initial.{name}", "cannot stand beside initial.steady, which gives it")
     return True
+
+
+def _frame(scene: dict[str, Any]) -> str:
+    """Frame of the zones of a belt."""
+    given = friction.get("frame", "belt") if isinstance(friction := scene.get("friction"), dict) else "belt"
+    one_of(given, FRAMES, "scene.friction.frame", "is no frame of zones")
+    return str(given)
 
 
 def _two_way(scene: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
@@ -262,7 +270,7 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> Iterator[str]:
     takes_force = _takes_force(model)
     by_formula = {"friction.mu": own.FORMULA in laws, "friction.at_rest": own.FORMULA in laws}
     by_formula |= dict.fromkeys(("drive.theta", "drive.velocity"), drive == own.FORMULA)
-    by_formula |= dict.fromkeys(("force.formula", "body.load.formula", "initial.steady"), takes_force)
+    by_formula |= dict.fromkeys(("force.formula", "body.load.formula", "initial.steady", "friction.frame"), takes_force)
     yield from (path for path, is_used in by_formula.items() if is_used)
     by_table = {"drive": drive == "table", "force": takes_force, "friction": own.TABLE_LAW in laws}
     by_table["body.load"] = takes_force
@@ -306,7 +314,7 @@ class _Keys:
         drives: Collection[str] = (*DRIVES, own.FORMULA),
     ):
         self.moved, self.defined, self.zones = moved, defined, zones
-        rest = {"elsewhere": moved.elsewhere, "two_way": moved.two_way}
+        rest = {"elsewhere": moved.elsewhere, "two_way": moved.two_way, "frame": moved.frame}
         structures = [*structures_of(moved.model, laws, defined, zones, drives, **rest)]
         structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
         paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
@@ -342,7 +350,7 @@ class _Keys:
         if key[:1].isdigit():
             return ": a comma ends a value in YAML, write a decimal point"
         if section.startswith("zone") and key in ("from", "to", "start", "end", "width"):
-            return ": a zone has a center, which is (from + to)/2, and a half_angle, which is (to - from)/2"
+            return ": a zone has a center, (from + to)/2, and a half_angle or on a belt a half_length, (to - from)/2"
         if not section and key in ("solver", "sweep", "record"):
             return f": the section `{key}` stands beside `scene`, not in it: take away its indentation"
         if len(key) < 2 or not any(str(known).startswith(key) for known in self.children.get(section, ())):

@@ -13,7 +13,7 @@ from ringsweep.config import axes, neighbours, options, own, uncertain
 from ringsweep.config.scene import STEADY, structures_of
 from ringsweep.config.sections import Keys
 from ringsweep.models import MODELS, parameters
-from ringsweep.models.scene import ELSEWHERE, LAW, WAYS
+from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.formula import COEFFICIENTS
@@ -54,6 +54,7 @@ def schema() -> dict[str, Any]:
             "friction.at_rest": by_formula["at_rest"],
             "drive.law": _word("how the ring is driven", drives),
             "initial.from": _text("result file of the run on the belt that goes on"),
+            "friction.frame": _word("where the zones of a belt lie (default: belt)", FRAMES),
             "initial.steady": _word("a motion to start from, in place of x and velocity", STEADY),
             "force.formula": _text("force on the body, N, as a formula of the time t, s"),
             "body.load.formula": _text("normal load beside the weight, N, as a formula of the time t, s"),

@@ -6,6 +6,7 @@ its cells; `values` are numbers in SI units by path, of shape ``(cells,)``.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ringsweep.compile import absorbed
 from ringsweep.errors import InputError
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.numerics.functions import any_of, select, square_root
-from ringsweep.physics import drives, friction
+from ringsweep.physics import drives, friction, zones
 from ringsweep.physics.friction.formula import FormulaError
 from ringsweep.physics.friction.speeds import hidden_fields, table_fields
 from ringsweep.physics.friction.velocity import EXPRESSIONS
@@ -74,6 +75,37 @@ def friction_coefficients(
         mu_s >= mu_k, f"{place}.mu_k", mu_k, "{} exceeds mu_s: kinetic friction cannot be greater than static friction"
     )
     return mu_s, mu_k
+
+
+def zone_parameters(structure: Structure, zone: type, rest: str) -> dict[str, Parameter]:
+    """Parameters of the zones, of type :class:`zones.Arc` or :class:`zones.Stretch`, and of the `rest`, by path."""
+    places = {f"friction.{structure.elsewhere}": rest}
+    if structure.arcs == ("zone",):
+        places["friction.rough"] = "the zone"
+    else:
+        places |= {arc: f"zone {number}" for number, arc in enumerate(structure.arcs, start=1)}
+    found = {}
+    for place, where in places.items():
+        for name, p in friction.coefficients_of(structure.law_type).items():
+            found[f"{place}.{name}"] = replace(p, long_name=f"{p.long_name} of {where}")
+    for arc in structure.arcs:
+        for name, p in declared(zone).items():
+            found[f"{arc}.{name}"] = replace(p, long_name=p.long_name.replace("the zone", places.get(arc, "the zone")))
+    return found
+
+
+def surface_from(structure: Structure, values: Values, zone: Any, period: Any = 2.0 * np.pi) -> tuple[Any, list[Any]]:
+    """Surface with zones of a type, and pairs of friction coefficients of all parts; see :func:`zones.surface_of`."""
+    rough = "friction.rough" if structure.arcs == ("zone",) else None
+    arcs = [
+        zone(
+            *(values[f"{arc}.{name}"] for name in declared(zone)),
+            *friction_coefficients(structure, rough or arc, values),
+        )
+        for arc in structure.arcs
+    ]
+    rest = friction_coefficients(structure, f"friction.{structure.elsewhere}", values)
+    return zones.surface_of(arcs, *rest, period), [rest, *((arc.mu_s, arc.mu_k) for arc in arcs)]
 
 
 def law_of(structure: Structure, values: Values, surfaces: list[Any], speed: NDArray[np.float64]) -> Any:

@@ -28,6 +28,10 @@ ELSEWHERE = "elsewhere", "rest"
 WAYS = "forward", "backward"
 
 
+#: Values of ``friction.frame``: where the zones of a belt lie.
+FRAMES = {"belt": "the zones move with the belt, and repeat with belt.period", "space": "the zones stand in space"}
+
+
 class Section(NamedTuple):
     """Points of a motion that a run keeps.
 
@@ -81,6 +85,8 @@ class Structure:
         Points that a run keeps.
     elsewhere : str
         Which of :data:`ELSEWHERE` the configuration has.
+    frame : str
+        Which of :data:`FRAMES` the zones of a belt have.
     two_way : tuple of str
         Paths of the friction coefficients that are given for both directions, under :data:`WAYS`.
     """
@@ -102,6 +108,7 @@ class Structure:
     exponent: bool = False
     section: Section | None = None
     elsewhere: str = "rest"
+    frame: str = "belt"
     two_way: tuple[str, ...] = ()
 
     @property

@@ -80,7 +80,8 @@ class Belt(NamedTuple):
     body : NamedTuple
         :class:`OnBelt`, or a type that lacks some of its parts.
     mu_s, mu_k : float or TwoWay
-        Static and kinetic friction coefficient, 1; see :mod:`ringsweep.physics.friction.ways`.
+        Static and kinetic friction coefficient, 1; see :mod:`ringsweep.physics.friction.ways`. On a belt with zones
+        the largest and the least one, or those of the place where a function says so.
     viscous : float
         Coefficient of viscous friction, N s/m.
     law, drive : NamedTuple
@@ -108,6 +109,8 @@ class Belt(NamedTuple):
         Deflection of the bristles at t = 0, m; an empty tuple without bristles.
     stops : Stops
         An empty tuple without stops.
+    surface : Segments
+        Zones of the belt, or in space; an empty tuple without zones.
     """
 
     body: Any
@@ -127,6 +130,7 @@ class Belt(NamedTuple):
     section: Any = ()
     initial_z: Any = ()
     stops: Any = ()
+    surface: Any = ()
 
 
 _with_body, _with_load = replacing("body"), replacing("load")

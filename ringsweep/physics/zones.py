@@ -1,7 +1,8 @@
-"""Surfaces: friction coefficients as a function of the place on the ring.
+"""Surfaces: friction coefficients as a function of the place on the ring, or along the belt.
 
 A surface is either uniform, or divided into segments by the edges of its zones. Angles are in the frame of the
-ring, in which the zones are fixed.
+ring, in which the zones are fixed. On a belt lengths (m) stand in place of angles (rad), and a period of the belt in
+place of a turn.
 
 `edges` are ascending angles, rad. A *place* is a segment and the number of whole turns to its lower edge, so that a
 contact on an edge is on one side of it, and rounding does not take it across. Models call these functions at events;
@@ -17,7 +18,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numba import types
 
-from ringsweep.compile import feature, function_from_lines, inlined, specialise
+from ringsweep.compile import absorbed, feature, function_from_lines, inlined, specialise
 from ringsweep.numerics.functions import floor, nearest, select
 from ringsweep.quantities.parameters import Leaf, Parameter
 
@@ -39,6 +40,25 @@ class Uniform(NamedTuple):
     mu_k: float
 
 
+class Ruler(NamedTuple):
+    """Measures of a surface along a line, m.
+
+    Attributes
+    ----------
+    period : float
+        Length after which the zones repeat. Longer than any way of a body if they do not.
+    unit : float
+        Length in proportion to which another one is rounding.
+    """
+
+    period: Leaf
+    unit: Leaf
+
+
+class InSpace(NamedTuple):
+    """Frame of zones that stand in space, and do not move with the belt."""
+
+
 class Segments(NamedTuple):
     """Ring that is divided into segments. Segment j is from edge j to edge j + 1; the last one ends at edge 0.
 
@@ -57,6 +77,10 @@ class Segments(NamedTuple):
         Largest static and least kinetic coefficient, 1.
     narrowest : float
         Width of the narrowest segment, rad.
+    ruler : Ruler
+        An empty tuple on a ring.
+    frame : InSpace
+        An empty tuple if the zones move with the ring or the belt.
     """
 
     edges: Any
@@ -65,6 +89,8 @@ class Segments(NamedTuple):
     arc: Any
     roughest: tuple[Leaf, Leaf]
     narrowest: Leaf
+    ruler: Any = ()
+    frame: Any = ()
 
 
 class Arc(NamedTuple):
@@ -76,15 +102,30 @@ class Arc(NamedTuple):
     mu_k: Any
 
 
-def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
-    """Surface of a ring with zones. Where zones overlap, the later one in the list holds.
+class Stretch(NamedTuple):
+    """Zone on a belt, as :class:`Arc`: centre and half-length, m; friction coefficients, 1."""
+
+    center: Annotated[Any, Parameter("m", "centre of the zone", default=0.0)]
+    half_length: Annotated[Any, Parameter("m", "half-length of the zone", lower=0.0)]
+    mu_s: Any
+    mu_k: Any
+
+
+# Ends of a surface that does not repeat, m.
+_FAR = 1e300
+
+
+def surface_of(arcs: Any, mu_s: Any, mu_k: Any, period: Any = 2.0 * pi) -> Uniform | Segments:
+    """Surface of a ring or a belt with zones. Where zones overlap, the later one in the list holds.
 
     Parameters
     ----------
-    arcs : list of Arc
+    arcs : list of Arc or Stretch
         Zones. Each field is a float or an array of shape ``(cells,)``.
     mu_s, mu_k : float or ndarray of shape ``(cells,)``
         Static and kinetic friction coefficient outside the zones, 1.
+    period : float or ndarray of shape ``(cells,)``, optional
+        Angle, or length of a belt, after which the zones repeat; None if they do not.
 
     Returns
     -------
@@ -93,10 +134,17 @@ def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
     """
     if not arcs:
         return Uniform(mu_s, mu_k)
-    circle = 2.0 * np.pi
-    ends = [np.asarray(a.center + side * a.half_angle, dtype=float) for a in arcs for side in (-1, 1)]
-    edges = np.stack(np.broadcast_arrays(*ends), axis=-1) % circle
-    edges = np.sort(np.where(edges >= circle, 0.0, edges), axis=-1)
+    ends = [np.asarray(a.center + side * a[1], dtype=float) for a in arcs for side in (-1, 1)]
+    edges = np.stack(np.broadcast_arrays(*ends), axis=-1)
+    if period is None:
+        unit = np.abs(edges).max(axis=-1)
+        edges, circle = np.insert(edges, 0, -_FAR, axis=-1), np.full((*unit.shape, 1), 2.0 * _FAR)
+    else:
+        circle = np.broadcast_to(np.asarray(period, dtype=float)[..., None], (*edges.shape[:-1], 1))
+        unit = circle[..., 0] * PER_TURN
+        edges = edges % circle
+        edges = np.where(edges >= circle, 0.0, edges)
+    edges = np.sort(edges, axis=-1)
     width = np.diff(edges, axis=-1, append=edges[..., :1] + circle)
     middle = edges + 0.5 * width
     static = np.broadcast_to(np.asarray(mu_s, dtype=float)[..., None], middle.shape)
@@ -104,18 +152,24 @@ def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
     index = np.zeros(middle.shape)
     for k, arc in enumerate(arcs, start=1):
         center, half_angle, rough_s, rough_k = (np.asarray(x, dtype=float)[..., None] for x in arc)
-        distance = np.abs((middle - center + np.pi) % circle - np.pi)
-        inside = distance < half_angle
+        offset = middle - center
+        distance = offset if period is None else (offset + 0.5 * circle) % circle - 0.5 * circle
+        inside = np.abs(distance) < half_angle
         static = np.where(inside, rough_s, static)
         kinetic = np.where(inside, rough_k, kinetic)
         index = np.where(inside, k, index)
     # A segment of negligible width takes the coefficients of the segment before it.
-    number = np.where(width > _NEGLIGIBLE_WIDTH, np.arange(edges.shape[-1]), -1)
+    counts = width > _NEGLIGIBLE_WIDTH * unit[..., None]
+    number = np.where(counts, np.arange(edges.shape[-1]), -1)
     number = np.maximum.accumulate(number, axis=-1)
     number = np.where(number < 0, number[..., -1:], number)
     static, kinetic, index = (np.take_along_axis(leaf, number, axis=-1) for leaf in (static, kinetic, index))
-    narrowest = np.where(width > _NEGLIGIBLE_WIDTH, width, circle).min(axis=-1)
-    return Segments(edges, static, kinetic, index, (static.max(axis=-1), kinetic.min(axis=-1)), narrowest)
+    narrowest = np.where(counts, width, circle).min(axis=-1)
+    roughest = static.max(axis=-1), kinetic.min(axis=-1)
+    if not isinstance(arcs[0], Stretch):
+        return Segments(edges, static, kinetic, index, roughest, narrowest)
+    ruler, frame = Ruler(circle[..., 0].copy(), unit), InSpace() if period is None else ()
+    return Segments(edges, static, kinetic, index, roughest, narrowest, ruler, frame)
 
 
 # The defaults are those of a uniform surface.
@@ -214,6 +268,35 @@ def _choose_roughness(surface: Any, turns: Any, shift: Any) -> Any:
 specialise(_roughness_of_segments, _choose_roughness, absorb=True)
 
 
+@absorbed
+def roughness_along(surface, place):
+    """Static and kinetic friction coefficient at a place on a belt, m, for floats and Lanes."""
+    period, begin, _ = _measures(surface.ruler, surface.edges)
+    x = place - period * floor((place - begin) / period)
+    return _latest(surface.mu_s, surface.edges, x), _latest(surface.mu_k, surface.edges, x)
+
+
+def _latest(values, edges, x):
+    """The value that belongs to the last edge up to `x`, in m; before the first edge that of the last one."""
+    found = values[len(values) - 1]
+    for j in range(len(edges)):
+        found = values[j] if edges[j] <= x else found
+    return found
+
+
+def _latest_for_kernels(values: Any, edges: Any, x: Any) -> Any:
+    """Code of :func:`_latest` for kernels: without a loop where the segments are tuples."""
+    if isinstance(values, types.Array):
+        return _latest
+    lines = [f"found = select(edges[{j}] <= x, values[{j}], found)" for j in range(len(values))]
+    return function_from_lines(
+        "values, edges, x", [f"found = values[{len(values) - 1}]", *lines, "return found"], {"select": select}
+    )
+
+
+specialise(_latest, _latest_for_kernels, absorb=True)
+
+
 @feature("surface.mu_s, surface.mu_k", of=Segments)
 def roughest(surface):
     """Largest static and least kinetic friction coefficient of the surface, 1."""
@@ -226,11 +309,18 @@ def narrowest(surface):
     return surface.narrowest
 
 
+@feature("2.0 * pi, 0.0, 1.0")
+def _measures(ruler, edges):
+    """Period of a surface, place at which it begins, and unit of its lengths: rad on a ring, m on a belt."""
+    return ruler.period, edges[0], ruler.unit
+
+
 @feature("0, 0", of=Segments)
 def locate(surface, angle):
     """Place of a contact at `angle`, rad: segment, and number of whole revolutions to the lower edge of the segment."""
-    revolution = math.floor(angle / (2.0 * pi))
-    x = angle - 2.0 * pi * revolution
+    circle, begin, _ = _measures(surface.ruler, surface.edges)
+    revolution = math.floor((angle - begin) / circle)
+    x = angle - circle * revolution
     found = -1
     for j in range(len(surface.edges)):
         if surface.edges[j] <= x:
@@ -257,7 +347,7 @@ def edge_ahead(surface, place, direction):
         j += 1
         if j == len(surface.edges):
             j, revolution = 0, revolution + 1
-    return surface.edges[j] + 2.0 * pi * revolution
+    return surface.edges[j] + _measures(surface.ruler, surface.edges)[0] * revolution
 
 
 @feature("place", of=Segments)
@@ -265,15 +355,16 @@ def cross_edge(surface, place, direction):
     """Place of a contact after it has crossed the edge ahead; arguments as for :func:`edge_ahead`."""
     j, revolution = place
     last = len(surface.edges) - 1
+    circle, _, unit = _measures(surface.ruler, surface.edges)
     while True:
         j += direction
         if j > last:
             j, revolution = 0, revolution + 1
         elif j < 0:
             j, revolution = last, revolution - 1
-        end = surface.edges[j + 1] if j < last else surface.edges[0] + 2.0 * pi
+        end = surface.edges[j + 1] if j < last else surface.edges[0] + circle
         # Edges at one place are crossed at once.
-        if end - surface.edges[j] > _NEGLIGIBLE_WIDTH:
+        if end - surface.edges[j] > _NEGLIGIBLE_WIDTH * unit:
             return j, revolution
 
 
@@ -297,3 +388,29 @@ def leave_edge(surface, place, angle, direction):
     """
     away = direction * (edge_ahead(surface, place, direction) - angle)
     return cross_edge(surface, place, direction) if away <= _ON_EDGE else place
+
+
+@feature("x - shift", absorb=True)
+def place_in(frame, x, shift):
+    """Place of a body in the frame of the zones of a belt, m; `x` in space, `shift` of the belt."""
+    return x
+
+
+@feature("False")
+def carries(frame):
+    """Whether a belt carries a body that sticks to it through the zones."""
+    return True
+
+
+# A body this close to an edge may be on it: units in the last place of the numbers whose difference the distance is,
+# and share of the unit of length.
+_ROUNDINGS, _ON_LINE = 2.0**-49, 1e-14
+
+
+@inlined
+def distance_to_edge(surface, place, direction, x, shift):
+    """Distance of a body on a belt from the edge of its segment in a direction, m; 0 if it is but rounding."""
+    edge = edge_ahead(surface, place, direction)
+    found = direction * (edge - place_in(surface.frame, x, shift))
+    rounding = _ROUNDINGS * (abs(x) + abs(shift)) + _ON_LINE * surface.ruler.unit
+    return 0.0 if abs(found) <= rounding else found

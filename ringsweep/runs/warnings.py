@@ -64,7 +64,7 @@ def warn_of_results(results: xr.Dataset, config: Config, *, counted: bool = Fals
             unsettled += int(np.count_nonzero((settled == 0) & ~np.isin(regime, _ENDED)))
     # Of a sweep with sections one looks at these.
     if size >= _MAP and np.count_nonzero(cells) == 1 and "section" not in results.dims and not counted:
-        zones = any(structure.arcs for structure in config.scene.structures.values())
+        zones = any(one.arcs and one.model != "belt" for one in config.scene.structures.values())
         where = ", does a contact meet the zone (zone.center counts from the bottom of the ring)" * zones
         why = "do the axes reach far enough, is the span long enough"
         regime = REGIMES[int(cells.argmax())]

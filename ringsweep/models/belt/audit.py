@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringsweep.compile import inlined
-from ringsweep.models.belt.force import breakaway_force, length_scale, moving, slip_from, speed_scale
+from ringsweep.models.belt.force import breakaway_force, in_segment, length_scale, moving, slip_from, speed_scale
 from ringsweep.models.interface import audit, implicit
 from ringsweep.models.sliding import audited, imbalances, larger, speed_in
 from ringsweep.models.slip import acceleration_slopes, slip
@@ -49,7 +49,7 @@ def _least_scales_on_belt(batch):
 @audit.violation.implements(Belt)
 def _violation_on_belt(scene, mode, forcing, y, rates, s, tolerance):
     """Implement :func:`audit.violation` for laws of the velocity: law, balance, and sign of the reaction."""
-    (x, v), scene = y, laden(scene.drive, scene, forcing)
+    (x, v), scene = y, laden(scene.drive, in_segment(scene.surface, scene, mode.place), forcing)
     body, push = scene.body, force_in(scene.drive, forcing)
     velocity = forcing[1] if mode.sign == 0 else moving(scene, v + forcing[1], v, forcing[1])
     moves = abs(velocity) + abs(forcing[1])

@@ -91,14 +91,14 @@ def _begin_on_bristle_belt(scene):
     v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
     y = scene.initial_x, v, z
     sign = 1 if v > 0.0 else -1
-    now = slip_at(scene, Mode(1, BAND, -1), t, y)
+    now = slip_at(scene, Mode(1, BAND, -1, ()), t, y)
     forcing = drives.turn(scene.drive, t)
     body = laden(scene.drive, scene, forcing).body
     acceleration, _ = ring.acceleration(body, *now.K, now.motion)
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
         sign = 1 if acceleration > forcing[2] else -1
-    mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC, -1)
+    mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC, -1, ())
     load = ring.reactions(body, *now.K, now.motion)[0]
     if load == 0.0:
         # The contact holds if the load begins to grow.
@@ -119,9 +119,9 @@ def _switch_on_bristle_belt(scene, mode, guard, t, y):
     if after_normal < 0:
         return SEPARATED_1, mode, y
     if after_normal == 0:
-        return RUNNING, Mode(-mode.sign, BAND, -1), (x, 0.0, z)
+        return RUNNING, Mode(-mode.sign, BAND, -1, ()), (x, 0.0, z)
     z, region = after_yield(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
-    return RUNNING, Mode(mode.sign, region, -1), (x, v, z)
+    return RUNNING, Mode(mode.sign, region, -1, ()), (x, v, z)
 
 
 @modes.is_lost.implements(BristleBelt)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from math import inf, nan
 
-from ringsweep.compile import inlined, unrolled
-from ringsweep.models.belt.force import coefficients, if_force, length_scale, located
+from ringsweep.compile import feature, inlined, unrolled
+from ringsweep.models.belt.force import coefficients, if_force, in_segment, length_scale, located
 from ringsweep.models.interface import implicit, modes
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
-from ringsweep.physics import belt, drives, ring
+from ringsweep.numerics.terms import joined
+from ringsweep.physics import belt, drives, ring, zones
 from ringsweep.physics.belt import laden
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.presliding import shown  # noqa: F401
@@ -38,7 +39,7 @@ def _error_scales_on_belt(scene, tolerance, x):
 @slip.implements(belt.Belt)
 def _slip_of_belt(scene, mode, common, forcing, x):
     """Implement :func:`slip`; `x` is the displacement relative to the belt, m, and the sliding velocity, m/s."""
-    v, sign = x[1], 1.0 if x[1] >= 0.0 else -1.0
+    v, sign, scene = x[1], 1.0 if x[1] >= 0.0 else -1.0, in_segment(scene.surface, scene, mode.place)
     mu, slope = friction_in(scene.law, mode.region, abs(v), coefficients(scene, float(mode.sign)))
     # In a dead band friction balances all other forces.
     yields = holds_in_band(scene.law) and mode.region < 0
@@ -54,6 +55,13 @@ def all_guards(body, normal, slow, fast):
     return ring.if_load_varies(body, (normal, slow, fast), (slow, fast))
 
 
+@feature("guards")
+def _with_edges(surface, guards, place, x, shift):
+    """Guards, and behind them the distances to both edges of the segment of a place, m."""
+    above = zones.distance_to_edge(surface, place, 1, x, shift)
+    return joined(guards, (above, zones.distance_to_edge(surface, place, -1, x, shift)))
+
+
 @implicit.guards_and_motion.implements(belt.Belt, belt.BristleBelt)
 def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
     """Implement :func:`implicit.guards_and_motion`.
@@ -67,7 +75,8 @@ def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
     friction = now.damping * body.mass * x[1] - now.K[0] * normal
     place, _, velocity = now.motion
     seen = place, velocity, acceleration, friction, x[0], x[1], forcing[2], deflection(x, scene.law, nan)
-    return all_guards(body, normal, *region_guards(scene, mode, common, x)), seen
+    guards = all_guards(body, normal, *region_guards(scene, mode, common, x))
+    return _with_edges(scene.surface, guards, mode.place, place, forcing[0]), seen
 
 
 @unrolled
@@ -95,11 +104,24 @@ def _sought_on_belt(scene, record, view):
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
 def _near_zero_on_belt(scene, motion):
     """Implement :func:`implicit.near_zero`: a twentieth of the weight for the reaction, nothing for the others."""
-    return all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0)
+    return _with_nothing(scene.surface, all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0))
+
+
+@feature("guards")
+def _with_nothing(surface, guards):
+    """Numbers for guards, and behind them 0 for both edges."""
+    return joined(guards, (0.0, 0.0))
 
 
 @modes.row.implements(belt.Belt, belt.BristleBelt)
 def _row_on_belt(scene, mode, forcing, y, seen):
-    """Implement :func:`modes.row`: displacement, velocity, friction, deflection, and -1, 0 or 1 for the mode."""
+    """Implement :func:`modes.row`: displacement, velocity, friction, deflection, and -1, 0 or 1 for the mode; zone."""
     x, velocity, friction = seen[:3]
-    return x, velocity, friction, deflection(y, scene.law, 0.0), 0.0 if mode.region < 0 else float(mode.sign)
+    state = 0.0 if mode.region < 0 else float(mode.sign)
+    return x, velocity, friction, deflection(y, scene.law, 0.0), state, *zone_of(scene.surface, mode)
+
+
+@feature("()")
+def zone_of(surface, mode):
+    """Number of the zone in which a body is in a mode, 0 for none; an empty tuple if there are no zones."""
+    return (zones.coefficients(surface, mode.place[0])[2],)

@@ -7,11 +7,11 @@ the external force if there is one.
 
 from __future__ import annotations
 
-from ringsweep.compile import absorbed, feature, inlined
+from ringsweep.compile import absorbed, feature, inlined, replacing
 from ringsweep.models.interface import shock
 from ringsweep.models.slip import Slip
 from ringsweep.numerics.functions import opposing, select
-from ringsweep.physics import belt, drives, ring
+from ringsweep.physics import belt, drives, ring, zones
 from ringsweep.physics.belt import OnBelt
 from ringsweep.physics.forces import force_in, force_rate, largest_force, load_rate
 from ringsweep.physics.friction.registry import dead_band
@@ -64,6 +64,23 @@ def slip_from(scene, x, velocity, v, forcing):
     K, slope = select(held, needed, opposing(mu, v)), select(held, 0.0, -slope)
     viscous = select(held, 0.0, viscous)
     return Slip((x, push - viscous * v, velocity), v, (K, K), (slope, slope), viscous / scene.body.mass, ())
+
+
+_with_coefficients = replacing("mu_s", "mu_k")
+
+
+@feature("scene")
+def in_segment(surface, scene, place):
+    """The scene with the friction coefficients of a place: a segment of the `surface` and the turn of the belt."""
+    mu_s, mu_k, _ = zones.coefficients(surface, place[0])
+    return _with_coefficients(scene, mu_s, mu_k)
+
+
+@feature("scene", absorb=True)
+def at_place(surface, scene, x, shift):
+    """The scene with the friction coefficients at `x` on a belt that has moved by `shift`, m; for floats and Lanes."""
+    mu_s, mu_k = zones.roughness_along(surface, zones.place_in(surface.frame, x, shift))
+    return _with_coefficients(scene, mu_s, mu_k)
 
 
 @absorbed

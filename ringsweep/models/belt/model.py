@@ -21,12 +21,24 @@ from ringsweep.models.belt.force import coefficients
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface.variation import Exponent
 from ringsweep.models.model import Continues, Model, period_of, phases
-from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
+from ringsweep.models.parts import (
+    GRAVITY,
+    MASS,
+    SPAN,
+    by_formula,
+    drive_of,
+    friction_coefficients,
+    law_of,
+    surface_from,
+    table_of,
+    zone_parameters,
+)
 from ringsweep.models.scene import WAYS, Structure, Values, require
-from ringsweep.physics import belt, drives, forces, friction, ring
+from ringsweep.physics import belt, drives, forces, friction, ring, zones
 from ringsweep.physics.friction.presliding import bristle, steady_deflection
 from ringsweep.physics.friction.velocity import KINETIC, friction_at
 from ringsweep.physics.friction.ways import TwoWay
+from ringsweep.physics.functions_of_time import common_period
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.variables import Variable
 
@@ -42,6 +54,8 @@ _INCLINE = Parameter(
     open_upper=True,
     optional=True,
 )
+
+_PERIOD = Parameter("m", "length of the belt after which its zones repeat", lower=0.0, open_lower=True, optional=True)
 
 # Optional fields of the body, by path.
 _OPTIONAL = {
@@ -69,7 +83,8 @@ class Belt(Model, Continues):
     driven: ClassVar[tuple[str, ...]] = ("belt_x", "belt_velocity")
     drive_unit: ClassVar[str] = "m"
     own_variables: ClassVar[dict[str, Variable]] = {
-        "jump_max": Variable("m/s^2", "largest jump of the acceleration of the body")
+        "jump_max": Variable("m/s^2", "largest jump of the acceleration of the body"),
+        "zone_1": Variable("1", "zone under the body", dtype="int32"),
     }
 
     has_exponent: ClassVar[bool] = True
@@ -114,7 +129,8 @@ class Belt(Model, Continues):
 
     def history(self, structure: Structure) -> tuple[str, ...]:
         """Names of the history variables, in the order of their columns."""
-        return "x", "velocity", "friction_force", friction.TRAITS[structure.law_type].state, "mode"
+        names = "x", "velocity", "friction_force", friction.TRAITS[structure.law_type].state, "mode"
+        return (*names, "zone_1") if structure.arcs else names
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Parameters of a scene of this structure, by path."""
@@ -132,7 +148,11 @@ class Belt(Model, Continues):
             "belt.velocity": Parameter("m/s", "velocity of the belt", optional=True),
             "belt.incline": _INCLINE,
         }
-        for name, p in friction.coefficients_of(law).items():
+        if structure.arcs:
+            found |= zone_parameters(structure, zones.Stretch, "the rest")
+            if structure.frame == "belt":
+                found["belt.period"] = _PERIOD
+        for name, p in friction.coefficients_of(law).items() if not structure.arcs else ():
             path = f"friction.{name}"
             both = {f"{path}.{way}": replace(p, long_name=f"{p.long_name}, sliding {way}") for way in WAYS}
             found |= both if path in structure.two_way else {path: p}
@@ -183,12 +203,10 @@ class Belt(Model, Continues):
 
     def build(self, structure: Structure, values: Values) -> belt.Belt | belt.BristleBelt:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
-        if structure.arcs:
-            raise InputError(f"scene.{structure.arcs[0]}", "a belt has no zones")
         values = _on_incline(values)
         law = structure.law_type
-        surfaces = _surfaces(structure, values)
-        mu_s, mu_k = surfaces[0] if len(surfaces) == 1 else map(TwoWay, *surfaces)
+        surface, surfaces = _surface(structure, values) if structure.arcs else ((), _surfaces(structure, values))
+        mu_s, mu_k = surface.roughest if surface else surfaces[0] if len(surfaces) == 1 else map(TwoWay, *surfaces)
         drive = self._drive(structure, values)
         sliding = np.zeros(len(values["time.span"]))
         if "initial.velocity" in values:
@@ -209,13 +227,17 @@ class Belt(Model, Continues):
             "initial_x": values.get("initial.x", np.zeros(len(mass))),
             "initial_v": sliding,
             "span": values["time.span"],
+            "surface": surface,
         }
         # A section may state a period of its own.
-        if structure.section is not None or not isinstance(forced, drives.Constant):
+        period = np.broadcast_to(drives.period(forced), mass.shape)
+        if structure.arcs and structure.frame == "belt":
+            period = _among_zones(structure, values, drive, forced, period)
+        if structure.section is not None or not isinstance(forced, drives.Constant) or period.any():
             fields["excited"] = belt.Excited()
         if structure.section is not None:
             fields["section"] = section.field(structure.section, _point(structure), len(mass))
-        fields |= _periods(structure, values, np.broadcast_to(drives.period(forced), mass.shape))
+        fields |= _periods(structure, values, period)
         if structure.exponent:
             rate = 2.0 * np.pi / np.minimum(fields["forcing_period"], values["time.span"])
             natural = np.sqrt(abs(values["spring.stiffness"]) / mass)
@@ -391,6 +413,43 @@ def _periods(structure: Structure, values: Values, period: NDArray[np.float64]) 
     }
 
 
+def _surface(structure: Structure, values: Values) -> Any:
+    """Surface with zones, and the friction coefficients of all its parts."""
+    law, name = structure.law_type, structure.law
+    if friction.family_of(law) is friction.Dynamic or friction.TRAITS[law].dead_band:
+        problem = f"not available with law {name}, whose friction is no function of place and speed alone"
+        raise InputError(f"scene.{structure.arcs[0]}", problem)
+    if structure.two_way:
+        raise InputError(
+            f"scene.{structure.two_way[0]}", "cannot depend on the direction beside zones: give one number"
+        )
+    if structure.steady:
+        raise InputError("scene.initial.steady", "not available with zones: give initial.x and initial.velocity")
+    period = None
+    if structure.frame == "belt":
+        problem = "missing: give the length after which the zones repeat, or friction.frame: space for zones in space"
+        if "belt.period" not in values:
+            raise InputError("scene.belt.period", problem)
+        period = values["belt.period"]
+        for arc in structure.arcs:
+            length = values[f"{arc}.half_length"]
+            require(length <= 0.5 * period, f"{arc}.half_length", length, "{} m is longer than half of belt.period")
+    return surface_from(structure, values, zones.Stretch, period)
+
+
+def _among_zones(
+    structure: Structure, values: Values, drive: Any, forced: Any, period: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Period of drive and force, s, if the zones move with the belt: they must return too; 0 if nothing moves."""
+    if not isinstance(drive, drives.Constant):
+        # The place of the belt must return, as the angle of a ring, not only its velocity.
+        of_force = drives.force_period(forced.force) if forced is not drive else 0.0
+        return np.broadcast_to(common_period(drives.force_period(drive), of_force), period.shape)
+    speed = np.abs(drive[0])
+    turn = np.divide(values["belt.period"], speed, out=np.zeros(len(speed)), where=speed > 0.0)
+    return np.broadcast_to(common_period(turn, period), period.shape)
+
+
 def _surfaces(structure: Structure, values: Values) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Static and kinetic friction coefficient; if some coefficient is given for both directions, for each of them."""
     if not structure.two_way:
@@ -443,6 +502,8 @@ class StopBelt(Belt):
             )
         if structure.own_load is not None or structure.load is not None:
             raise InputError("scene.stops", "cannot stand beside body.load, a load that varies in time: leave one out")
+        if structure.arcs:
+            raise InputError("scene.stops", "cannot stand beside zones: leave stops out")
         if "stops.low" not in values and "stops.high" not in values:
             raise InputError("scene.stops", "low or high is missing: give one of them or both, such as `high: 2 cm`")
         free = super().build(replace(structure, impact=False), values)

@@ -633,7 +633,9 @@ def _begin_record_on_belt(scene, t, seen):
 
 @recorder.after_event.implements(Belt)
 def _after_event_on_belt(scene, record, before, mode, t):
-    """Implement :func:`recorder.after_event`: under a smooth law nothing jumps."""
+    """Implement :func:`recorder.after_event`: under a smooth law the acceleration jumps at the edge of a zone alone."""
+    if before.place != mode.place:
+        return record
     return _with_shocks(record, shock.without_jump(family(scene.law), record.shocks))
 
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from math import nan
 
+from ringsweep.compile import feature
 from ringsweep.models.belt.creep import deflection
-from ringsweep.models.belt.force import moving, slip_from
+from ringsweep.models.belt.force import at_place, moving, slip_from
 from ringsweep.models.inspection import inspection, rates_in_space, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
-from ringsweep.physics import drives
+from ringsweep.physics import drives, zones
 from ringsweep.physics.belt import Belt, BristleBelt
 
 
@@ -25,6 +26,7 @@ def _initial_state_on_belt(scene):
 @slip_in_space.implements(Belt)
 def _slip_in_space_on_belt(scene, y, v, forcing, angle):
     """Implement :func:`slip_in_space`; nothing is added to the slip."""
+    scene = at_place(scene.surface, scene, y[0], forcing[0])
     return slip_from(scene, y[0], moving(scene, y[1], v, forcing[1]), v, forcing), ()
 
 
@@ -51,4 +53,23 @@ def _seen_in_constant_step_on_belt(scene, y, now):
 def _row_of_constant_step_on_belt(scene, y, forcing):
     """Implement :func:`constant_step.row`: the same columns as :func:`modes.row` on the belt."""
     now = constant_step.inspect(scene, y, forcing)
-    return y[0], now.motion[2], now.friction, deflection(y, scene.law, 0.0), word_of_mode(scene, now)
+    zone = _zone_at(scene.surface, y[0], forcing[0])
+    return y[0], now.motion[2], now.friction, deflection(y, scene.law, 0.0), word_of_mode(scene, now), *zone
+
+
+@feature("()")
+def _zone_at(surface, x, shift):
+    """Number of the zone at `x` on a belt that has moved by `shift`, m; an empty tuple if there are no zones."""
+    return (zones.coefficients(surface, zones.locate(surface, zones.place_in(surface.frame, x, shift))[0])[2],)
+
+
+@constant_step.arc_share.implements(Belt)
+def _arc_share_on_belt(scene, now, h):
+    """Implement :func:`constant_step.arc_share`."""
+    return _share_of_narrowest(scene.surface, now, h)
+
+
+@feature("0.0", absorb=True)
+def _share_of_narrowest(surface, now, h):
+    """Way among the zones in a step, as a share of the narrowest segment."""
+    return abs(zones.place_in(surface.frame, now.motion[2], now.motion[2] - now.v)) * (h / surface.narrowest)

@@ -10,7 +10,7 @@ the rows that are named below. In a kernel the order of statements counts: each 
 from __future__ import annotations
 
 from math import nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ringsweep.compile import feature, inlined
 from ringsweep.models.belt.force import (
@@ -18,6 +18,7 @@ from ringsweep.models.belt.force import (
     coefficients,
     direction,
     if_force,
+    in_segment,
     length_scale,
     located,
     moving,
@@ -39,7 +40,7 @@ from ringsweep.numerics.terms import (
     part_from,
     set_factors,
 )
-from ringsweep.physics import belt, drives, ring
+from ringsweep.physics import belt, drives, ring, zones
 from ringsweep.physics.forces import Laden, expand_force, expand_load, force_in, largest_force
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import (
@@ -59,7 +60,7 @@ from ringsweep.physics.friction.ways import along
 X, V, VELOCITY, ACCELERATION, FORCE, SHIFT, PUSH, LOAD, SQUARE, CUBE, RATIO, FACTORS = range(12)
 _GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
 # The normal reaction is a guard only if it varies.
-NORMAL, SLOW, FAST = range(_GUARDS, _GUARDS + 3)
+NORMAL, SLOW, FAST, EDGE_ABOVE, EDGE_BELOW = range(_GUARDS, _GUARDS + 5)
 
 
 class Mode(NamedTuple):
@@ -73,11 +74,14 @@ class Mode(NamedTuple):
         Region of the friction law.
     entry_guard : int
         Row of the guard that is zero on entry, or -1.
+    place : tuple of int
+        Segment and turn of the surface; an empty tuple without zones.
     """
 
     sign: int
     region: int
     entry_guard: int
+    place: Any
 
 
 @modes.in_space.implements(belt.Belt)
@@ -89,44 +93,58 @@ def _in_space_on_belt(scene, t, y):
 
 @series.table_shape.implements(belt.Belt)
 def _table_shape_on_belt(scene):
-    """Implement :func:`series.table_shape`; the reaction is a guard only if it varies."""
-    return FAST + 1, ring.if_load_varies(scene.body, NORMAL, SLOW)
+    """Implement :func:`series.table_shape`; the reaction is a guard if it varies, edges if there are zones."""
+    return _rows(scene.surface), ring.if_load_varies(scene.body, NORMAL, SLOW)
+
+
+@feature("FAST + 1")
+def _rows(surface):
+    """Number of rows of the table."""
+    return EDGE_BELOW + 1
+
+
+@feature("()")
+def _place_at(surface, x, shift):
+    """Segment and turn of the surface under a body at `x`, on a belt that has moved by `shift`, m."""
+    return zones.locate(surface, zones.place_in(surface.frame, x, shift))
 
 
 @modes.begin.implements(belt.Belt)
 def _begin_on_belt(scene):
     """Implement :func:`modes.begin`; the state is ``(x, v)``."""
-    t, v = drives.beginning(scene.drive), drives.velocity_at_beginning(scene.drive, scene.initial_v)
-    status, mode = _mode_at(scene, Instant(t, 0.0), scene.initial_x, v)
-    return t, (scene.initial_x, v), status, mode
+    t, x = drives.beginning(scene.drive), scene.initial_x
+    v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
+    place = _place_at(scene.surface, x, drives.turn(scene.drive, Instant(t, 0.0))[0])
+    status, mode = _mode_at(in_segment(scene.surface, scene, place), place, Instant(t, 0.0), x, v)
+    return t, (x, v), status, mode
 
 
 @modes.after_jump.implements(belt.Belt)
 def _after_jump_on_belt(scene, mode, t, y, jump):
     """Implement :func:`modes.after_jump`."""
     x, v = y[0], y[1] - jump
-    status, mode = _mode_at(scene, t, x, v)
+    status, mode = _mode_at(in_segment(scene.surface, scene, mode.place), mode.place, t, x, v)
     return status, mode, (x, v)
 
 
 @inlined
-def _mode_at(scene, t, x, v):
-    """Status and mode of a body at a place, m, with a sliding velocity, m/s."""
+def _mode_at(scene, place, t, x, v):
+    """Status and mode of a body at `x`, m, with a sliding velocity, m/s; `scene` has the friction of the `place`."""
     laden = belt.laden_at(scene.drive, scene, t)
-    status, mode = RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
+    status, mode = RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1, place)
     if ring.if_load_varies(scene.body, True, False) and ring.reactions(laden.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
-        status, mode = SEPARATED_1, Mode(0, KINETIC, -1)
+        status, mode = SEPARATED_1, Mode(0, KINETIC, -1, place)
     elif holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
-        mode = mode_at_rest(scene, t, x)
+        mode = mode_at_rest(scene, place, t, x)
     elif v == 0.0:
         pull = stuck_pull(scene, x, v, drives.turn(scene.drive, t))
-        mode = Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
+        mode = Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW, place)
     return status, mode
 
 
 @inlined
-def mode_at_rest(scene, t, x):
-    """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
+def mode_at_rest(scene, place, t, x):
+    """Mode of a set-valued law at a sliding velocity of zero or within the dead band; `place` as in a mode."""
     forcing = drives.turn(scene.drive, t)
     scene, pull = belt.laden(scene.drive, scene, forcing), stuck_pull(scene, x, 0.0, forcing)
     bound = breakaway_force(scene, direction(scene.mu_s, pull, scene, t, x, forcing), x)
@@ -136,44 +154,57 @@ def mode_at_rest(scene, t, x):
         (pull, load), least = stuck_rates(scene, t, x, forcing), 0.0
         bound = along(scene.mu_s, pull) * load
     if bound > 0.0 and abs(pull) <= bound + least:
-        return Mode(0, KINETIC, -1)
-    return _loose(scene, 1 if pull >= 0.0 else -1)
+        return Mode(0, KINETIC, -1, place)
+    return _loose(scene, place, 1 if pull >= 0.0 else -1)
 
 
 @inlined
-def _loose(scene, sign):
+def _loose(scene, place, sign):
     """Mode of a body that has just broken loose."""
     # Without a dead band the sliding velocity, which is zero here, is a guard.
-    return Mode(sign, region_at(scene.law, 0.0), SLOW if stiction_band(scene.law) == 0.0 else -1)
+    return Mode(sign, region_at(scene.law, 0.0), SLOW if stiction_band(scene.law) == 0.0 else -1, place)
 
 
 @modes.switch.implements(belt.Belt)
 def _switch_on_belt(scene, mode, guard, t, y):
-    """Implement :func:`modes.switch`; `guard` is NORMAL, SLOW or FAST."""
+    """Implement :func:`modes.switch`; `guard` is NORMAL, SLOW or FAST, or an edge."""
     x, _ = y
     if guard == NORMAL:
         return SEPARATED_1, mode, y
-    sign, region = mode.sign, mode.region
+    sign, region, place = mode.sign, mode.region, mode.place
+    if guard > FAST:
+        place = _beyond(scene.surface, place, 1 if guard == EDGE_ABOVE else -1)
+        scene = in_segment(scene.surface, scene, place)
+        if holds_in_band(scene.law) and y[1] == 0.0:
+            return RUNNING, mode_at_rest(scene, place, t, x), y
+        return RUNNING, Mode(sign, region, SLOW if y[1] == 0.0 else -1, place), y
+    scene = in_segment(scene.surface, scene, place)
     if sign == 0:
         # A long series may reach the breakaway force by its own error alone: one more, short step decides.
         forcing = drives.turn(scene.drive, t)
         pull, laden = stuck_pull(scene, x, 0.0, forcing), belt.laden(scene.drive, scene, forcing)
         if mode.entry_guard != guard and abs(pull) <= breakaway_force(laden, pull, x):
-            return RUNNING, Mode(0, KINETIC, guard), y
-        return RUNNING, _loose(scene, 1 if guard == SLOW else -1), y
+            return RUNNING, Mode(0, KINETIC, guard, place), y
+        return RUNNING, _loose(scene, place, 1 if guard == SLOW else -1), y
     low, high = region_bounds(scene.law, region)
     if guard == FAST:
-        return RUNNING, Mode(sign, region + 1, SLOW), (x, sign * high)
+        return RUNNING, Mode(sign, region + 1, SLOW, place), (x, sign * high)
     if low > 0.0:
         if holds_in_band(scene.law) and region - 1 < 0:
-            return RUNNING, mode_at_rest(scene, t, x), (x, sign * low)
-        return RUNNING, Mode(sign, region - 1, FAST), (x, sign * low)
+            return RUNNING, mode_at_rest(scene, place, t, x), (x, sign * low)
+        return RUNNING, Mode(sign, region - 1, FAST, place), (x, sign * low)
     if holds_in_band(scene.law) and region < 0:
         # The pull has fallen to the breakaway force.
-        return RUNNING, Mode(0, KINETIC, -1), y
+        return RUNNING, Mode(0, KINETIC, -1, place), y
     if region < 0:
-        return RUNNING, Mode(-sign, region, SLOW), (x, 0.0)
-    return RUNNING, mode_at_rest(scene, t, x), (x, 0.0)
+        return RUNNING, Mode(-sign, region, SLOW, place), (x, 0.0)
+    return RUNNING, mode_at_rest(scene, place, t, x), (x, 0.0)
+
+
+@feature("place")
+def _beyond(surface, place, direction):
+    """Place of a body that has crossed the edge of its segment."""
+    return zones.cross_edge(surface, place, direction)
 
 
 @feature("0.0", of=ring.having(belt.OnBelt, "cubic"))
@@ -224,7 +255,7 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
     """Implement :func:`series.fill_table`: fill all rows of the table, in stick, in a dead band, or in slip."""
     drives.expand_at(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
     expand_load(scene.drive, t, ORDER, c[LOAD], c[FACTORS:])
-    scene = _laden_after(scene.drive, scene, c, 0.0)
+    scene = _laden_after(scene.drive, in_segment(scene.surface, scene, mode.place), c, 0.0)
     body = scene.body
     if if_force(body, True, False):
         expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
@@ -267,6 +298,7 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
                 c[SLOW, 1] = 0.0
     if ring.if_load_varies(body, c[NORMAL, 0] == 0.0, False):
         _from_no_load(c, mode.sign == 0)
+    _expand_edges(scene.surface, mode, c)
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     velocity = abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1])
     length = abs(c[X, 0]) + length_scale(scene, velocity)
@@ -281,6 +313,26 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
     units = (X, 1.0 / (length * tolerance)), (V, 1.0 / (speed * tolerance)), (SLOW, per_force)
     h = step_within(c, units)
     return (h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)), h
+
+
+@feature("None")
+def _expand_edges(surface, mode, c):
+    """Fill the guards of both edges of a segment.
+
+    The body may be on an edge. It leaves it to the side to which it moves: there the zero at the beginning is no event.
+    """
+    for row, side in ((EDGE_ABOVE, 1), (EDGE_BELOW, -1)):
+        c[row, 0] = zones.distance_to_edge(surface, mode.place, side, c[X, 0], c[SHIFT, 0])
+        zeros = 0 if c[row, 0] != 0.0 else 1
+        for k in range(1, ORDER + 1):
+            c[row, k] = -side * zones.place_in(surface.frame, c[X, k], c[SHIFT, k])
+            if zeros == k and c[row, k] == 0.0:
+                zeros += 1
+        if zeros > ORDER or (mode.sign == 0 and not zones.carries(surface.frame)):
+            # Where the body rests among the zones there is no crossing.
+            c[row, 0], zeros = 1.0, 0
+        for k in range(ORDER + 1 if zeros > 0 else 0):
+            c[row, k] = c[row, k + zeros] if k + zeros <= ORDER else 0.0
 
 
 @inlined
@@ -353,7 +405,7 @@ def _seen_sliding(scene, v, difference):
 @series.seen_at.implements(belt.Belt)
 def _seen_at_on_belt(scene, mode, c, s, h):
     """Implement :func:`series.seen_at`: what ``_observe_on_belt`` in :mod:`record` takes."""
-    velocity = value(c[VELOCITY], s)
+    scene, velocity = in_segment(scene.surface, scene, mode.place), value(c[VELOCITY], s)
     if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0

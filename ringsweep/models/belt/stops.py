@@ -13,7 +13,7 @@ belt.
 from __future__ import annotations
 
 from math import nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ringsweep.compile import inlined
 from ringsweep.models.belt.force import (
@@ -73,12 +73,15 @@ class Mode(NamedTuple):
     sign, region, entry_guard : int
         As in :class:`ringsweep.models.belt.series.Mode`.
     stop : AtStop
+    place : tuple
+        Empty: there are no zones between stops.
     """
 
     sign: int
     region: int
     entry_guard: int
     stop: AtStop
+    place: Any
 
 
 # What does not know of the stops is that of the belt without them.
@@ -135,17 +138,15 @@ def _at_rest(scene, t, side, stop):
         turns = forcing[2] if forcing[2] != 0.0 else drives.jerk_at(scene.drive, t)
         sign, entry = 1 if turns < 0.0 else -1, SLOW
         if holds_in_band(scene.law) and side * turns <= 0.0:
-            found = mode_at_rest(scene, t, x)
+            found = mode_at_rest(scene, (), t, x)
             sign = found.sign
             if sign == 0 or (turns == 0.0 and sign == side and breakaway_force(scene, float(side), x) > 0.0):
                 # On a belt at rest the stop bears what exceeds the breakaway force.
-                return Mode(0, KINETIC, -1, AtStop(side * abs(sign), stop.impacts, stop.speed_max, 0.0, stop.lasts)), (
-                    x,
-                    0.0,
-                )
+                rests = AtStop(side * abs(sign), stop.impacts, stop.speed_max, 0.0, stop.lasts)
+                return Mode(0, KINETIC, -1, rests, ()), (x, 0.0)
     pressed = side * _acceleration(scene, x, float(sign), v, forcing) >= -_BALANCED * located(scene, x, 0.0).size
     at_stop = AtStop(side if pressed else 0, stop.impacts, stop.speed_max, 0.0, stop.lasts)
-    return Mode(sign, region_at(scene.law, abs(v)), entry, at_stop), (x, v)
+    return Mode(sign, region_at(scene.law, abs(v)), entry, at_stop, ()), (x, v)
 
 
 @modes.begin.implements(StopBelt)
@@ -156,7 +157,7 @@ def _begin_between_stops(scene):
     if status == RUNNING and side != 0 and _is_still(y[1], drives.turn(scene.drive, Instant(t, 0.0))):
         rests, y = _at_rest(scene, Instant(t, 0.0), side, stop)
         return t, y, RUNNING, rests
-    return t, y, status, Mode(mode.sign, mode.region, mode.entry_guard, stop)
+    return t, y, status, Mode(mode.sign, mode.region, mode.entry_guard, stop, ())
 
 
 @modes.switch.implements(StopBelt)
@@ -167,10 +168,10 @@ def _switch_between_stops(scene, mode, guard, t, y):
         if stop.rests != 0:
             # Nothing presses the body any more.
             leaves, v = AtStop(0, stop.impacts, stop.speed_max, 0.0, stop.lasts), -drives.turn(scene.drive, t)[1]
-            return RUNNING, Mode(mode.sign, mode.region, SLOW if v == 0.0 else -1, leaves), (y[0], v)
+            return RUNNING, Mode(mode.sign, mode.region, SLOW if v == 0.0 else -1, leaves, ()), (y[0], v)
         after, state = _impact(scene, mode, side, t, y)
         return RUNNING, after, state
-    old = FreeMode(mode.sign, mode.region, mode.entry_guard)
+    old = FreeMode(mode.sign, mode.region, mode.entry_guard, ())
     status, new, state = modes.switch(scene.stops.free, old, guard, t, y)
     if stop.rests != 0 and holds_in_band(scene.law) and state[1] == 0.0:
         # The belt comes to rest, and friction is that of a body at rest.
@@ -180,8 +181,8 @@ def _switch_between_stops(scene, mode, guard, t, y):
         forcing = drives.turn(scene.drive, t)
         if forcing[1] == 0.0 and forcing[2] == 0.0:
             presses = AtStop(new.sign, stop.impacts, stop.speed_max, 0.0, 0.0)
-            return status, Mode(0, KINETIC, -1, presses), state
-    return status, Mode(new.sign, new.region, new.entry_guard, stop), state
+            return status, Mode(0, KINETIC, -1, presses, ()), state
+    return status, Mode(new.sign, new.region, new.entry_guard, stop, ()), state
 
 
 @inlined
@@ -204,11 +205,11 @@ def _impact(scene, mode, side, t, y):
         lasts = rebound * (1.0 / away + ratio / back) / (1.0 - e * ratio)
     if short:
         return _at_rest(scene, t, side, AtStop(0, stop.impacts + 1.0, speed_max, 0.0, lasts))
-    after = FreeMode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), SLOW if v == 0.0 else -1)
+    after = FreeMode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), SLOW if v == 0.0 else -1, ())
     if holds_in_band(scene.law) and v == 0.0:
-        after = mode_at_rest(scene, t, x)
+        after = mode_at_rest(scene, (), t, x)
     hit = AtStop(0, stop.impacts + 1.0, speed_max, -side * rebound, 0.0)
-    return Mode(after.sign, after.region, after.entry_guard, hit), (x, v)
+    return Mode(after.sign, after.region, after.entry_guard, hit, ()), (x, v)
 
 
 @series.fill_table.implements(StopBelt)
@@ -217,7 +218,7 @@ def _fill_table_between_stops(scene, mode, t, y, tolerance, c):
     if mode.stop.rests != 0:
         return _fill_at_rest(scene, mode, t, tolerance, c)
     longest, reach = series.fill_table(
-        scene.stops.free, FreeMode(mode.sign, mode.region, mode.entry_guard), t, y, tolerance, c
+        scene.stops.free, FreeMode(mode.sign, mode.region, mode.entry_guard, ()), t, y, tolerance, c
     )
     for row, side in ((LOW, -1), (HIGH, 1)):
         set_terms(c[row], terms(c[X]) * float(-side))
@@ -340,7 +341,7 @@ def _violation_between_stops(scene, mode, forcing, y, rates, s, tolerance):
     length = abs(x) + length_scale(scene, abs(v) + 2.0 * abs(forcing[1]))
     beyond = max(stops.low - x, x - stops.high) / (tolerance * length)
     if side == 0:
-        free = FreeMode(mode.sign, mode.region, mode.entry_guard)
+        free = FreeMode(mode.sign, mode.region, mode.entry_guard, ())
         violation, power = audit.violation(stops.free, free, forcing, y, rates, s, tolerance)
         return larger(violation, beyond), power
     pressing = side * _acceleration(scene, x, float(mode.sign), v, forcing)

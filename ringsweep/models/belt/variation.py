@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from ringsweep.compile import feature, hook
 from ringsweep.models import section, tangent
-from ringsweep.models.belt.force import stuck_gradient, stuck_rates
+from ringsweep.models.belt.force import in_segment, stuck_gradient, stuck_rates
 from ringsweep.models.belt.record import with_tangent
-from ringsweep.models.belt.series import SLOW
+from ringsweep.models.belt.series import FAST, SLOW
 from ringsweep.models.interface import variation
-from ringsweep.physics import drives, ring
+from ringsweep.physics import drives, ring, zones
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.presliding import region_guard, scales
 from ringsweep.physics.friction.registry import holds_in_band
@@ -69,7 +69,10 @@ def _gradient(scene, mode, guard, t, y, rates):
 
 @_gradient.implements(Belt)
 def _gradient_on_belt(scene, mode, guard, t, y, rates):
-    """Implement :func:`_gradient`, by the formulas of breakaway and of the bounds of a region."""
+    """Implement :func:`_gradient`, by the formulas of breakaway, of the bounds of a region and of edges."""
+    if guard > FAST:
+        return _gradient_of_edge(scene.surface, rates[0], drives.turn(scene.drive, t)[1]), 0.0
+    scene = in_segment(scene.surface, scene, mode.place)
     yields = holds_in_band(scene.law) and mode.region < 0 and guard == SLOW
     if mode.sign != 0 and not yields:
         return 0.0, 1.0 / rates[1] if rates[1] != 0.0 else 0.0
@@ -83,6 +86,13 @@ def _gradient_on_belt(scene, mode, guard, t, y, rates):
     by_x = mu_s * load - way * pull
     rate = mu_s * load_rate - way * pull_rate
     return by_x / rate if rate != 0.0 else 0.0, 0.0
+
+
+@feature("0.0")
+def _gradient_of_edge(surface, velocity, belt_velocity):
+    """Derivative of the distance to an edge by the displacement, divided by its rate, s/m; velocities in space."""
+    rate = zones.place_in(surface.frame, velocity, belt_velocity)
+    return 1.0 / rate if rate != 0.0 else 0.0
 
 
 @_gradient.implements(BristleBelt)

@@ -7,7 +7,6 @@ of shape ``(cells,)``; see :mod:`ringsweep.models.scene`.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 from math import inf, pi
 from typing import Any, ClassVar
 
@@ -18,7 +17,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import section, tangent
 from ringsweep.models.interface.variation import Exponent
 from ringsweep.models.model import Continues, Model, period_of, phases
-from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
+from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, surface_from, zone_parameters
 from ringsweep.models.ring import long_run, record
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import PAPER, contact, drives, friction, ring, zones
@@ -147,19 +146,8 @@ class SingleContactRing(Model, Continues):
         """Parameters of a scene of this structure, by path."""
         law = structure.law_type
         found = dict(self.body)
-        places = {f"friction.{structure.elsewhere}": "the rest of the ring"}
-        if structure.arcs == ("zone",):
-            places["friction.rough"] = "the zone"
-        else:
-            places |= {arc: f"zone {number}" for number, arc in enumerate(structure.arcs, start=1)}
-        for place, where in places.items():
-            for name, p in friction.coefficients_of(law).items():
-                found[f"{place}.{name}"] = replace(p, long_name=f"{p.long_name} of {where}")
+        found |= zone_parameters(structure, zones.Arc, "the rest of the ring")
         found |= {f"friction.{name}": p for name, p in declared(law).items()}
-        for arc in structure.arcs:
-            for name, p in declared(zones.Arc).items():
-                whose = places.get(arc, "the zone")
-                found[f"{arc}.{name}"] = replace(p, long_name=p.long_name.replace("the zone", whose))
         found |= {f"drive.{name}": p for name, p in declared(structure.drive_type).items()}
         return found | {
             "initial.phi": Parameter("rad", "angle of the body at launch", default=0.0),
@@ -173,18 +161,7 @@ class SingleContactRing(Model, Continues):
 
     def build(self, structure: Structure, values: Values) -> ring.Ring | ring.BristleRing:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
-        rough = "friction.rough" if structure.arcs == ("zone",) else None
-        arcs = [
-            zones.Arc(
-                values[f"{arc}.center"],
-                values[f"{arc}.half_angle"],
-                *friction_coefficients(structure, rough or arc, values),
-            )
-            for arc in structure.arcs
-        ]
-        rest = friction_coefficients(structure, f"friction.{structure.elsewhere}", values)
-        surface = zones.surface_of(arcs, *rest)
-        surfaces = [rest, *((arc.mu_s, arc.mu_k) for arc in arcs)]
+        surface, surfaces = surface_from(structure, values, zones.Arc)
         try:
             body = self.build_body(values)
         except KeyError as error:

@@ -1,0 +1,171 @@
+"""Zones of other friction on the belt, and in space."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from belts import on_belt, outcome
+from tiers import mostly_slow
+
+import ringsweep
+
+G = 9.81
+
+
+def with_zones(zones, elsewhere, frame="belt", period=1.0, law="stiction", **rest):
+    """Body on a belt with zones ``(center, half_length, mu_s, mu_k)``; all parts are there, so kernels are shared."""
+    friction = {"law": law, "frame": frame, "elsewhere": dict(zip(("mu_s", "mu_k"), elsewhere, strict=True))}
+    scene = on_belt(friction, **({"velocity": 0.0, "stiffness": 0.0, "force": (0.0, 0.5), "span": 4.0} | rest))
+    scene["zones"] = [dict(zip(("center", "half_length", "mu_s", "mu_k"), zone, strict=True)) for zone in zones]
+    if frame == "belt":
+        scene["belt"]["period"] = period
+    return scene
+
+
+def where_it_stops(energy, low, high, period, rough, rest):
+    """Way along which friction takes an energy by mass and g, over patches from `low` to `high` in each period."""
+    x, edges = 0.0, [(n * period + e, mu) for n in range(99) for e, mu in ((low, rest), (high, rough))]
+    for edge, mu in edges:
+        if energy <= mu * (edge - x):
+            return x + energy / mu
+        energy, x = energy - mu * (edge - x), edge
+    raise AssertionError
+
+
+@pytest.mark.parametrize(("frame", "period"), [("belt", 0.7), ("space", 1e9)])
+def test_friction_over_patches_takes_the_energy_of_the_launch(frame, period):
+    scene = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), frame, 0.7)
+    speeds = np.linspace(0.3, 3.0, 15)
+    run = ringsweep.sweep(scene, {"initial.velocity": np.append(speeds, -1.0)}, progress=False)
+    stops = [where_it_stops(v * v / (2.0 * G), 0.2, 0.4, period, 0.4, 0.1) for v in speeds]
+    assert run.x_end.values[:-1] == pytest.approx(stops, rel=1e-12)
+    assert run.certified.all()
+    # Backwards the next patch begins a period less 0.4 m away, or there is none.
+    behind = where_it_stops(1.0 / (2.0 * G), period - 0.4, period - 0.2, period, 0.4, 0.1)
+    assert run.x_end.values[-1] == pytest.approx(-behind, rel=1e-12)
+
+
+def test_a_patch_of_the_whole_period_is_no_patch():
+    axes = {"belt.velocity": np.linspace(0.05, 0.6, 6)}
+    rest = {"stiffness": 8.0, "force": (1.0, 0.4), "start": (0.1, 0.3)}
+    names = ["x_end", "velocity_end", "stick_time", "force_max", "x_max"]
+    one = ringsweep.sweep(with_zones([(0.2, 0.5, 0.4, 0.2)], (0.9, 0.8), **rest), axes, progress=False)
+    none = ringsweep.sweep(
+        on_belt({"law": "stiction", "mu_s": 0.4, "mu_k": 0.2}, span=4.0, **rest), axes, progress=False
+    )
+    for name in names:
+        assert one[name].values == pytest.approx(none[name].values, rel=1e-11, abs=1e-11)
+    assert (one.regime == none.regime).all()
+
+
+def test_a_belt_carries_a_stuck_body_to_the_edge_of_a_smooth_stretch():
+    # It breaks loose at the edge, 0.1 m on: the spring pulls less than friction before it and more than behind it.
+    scene = with_zones([(0.3, 0.2, 0.05, 0.02)], (0.5, 0.4), "space", velocity=0.5, stiffness=10.0)
+    run = outcome(scene)
+    assert run.first_slip.item() == pytest.approx(0.1 / 0.5, rel=1e-12)
+    assert run.certified.item() == 1
+
+
+def test_a_stuck_body_on_a_patch_of_the_belt_stays_on_it():
+    # It breaks loose at the static friction of its patch, where it is in space.
+    scene = with_zones([(0.0, 0.1, 0.3, 0.2)], (0.1, 0.1), velocity=0.5, stiffness=10.0)
+    assert outcome(scene).first_slip.item() == pytest.approx(0.3 * G / 10.0 / 0.5, rel=1e-12)
+
+
+def test_the_millionth_period_of_a_belt_is_as_exact_as_the_first():
+    start = 700_000.0
+    run = outcome(with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), period=0.7, start=(start, 3.0)))
+    stop = where_it_stops(9.0 / (2.0 * G), 0.2, 0.4, 0.7, 0.4, 0.1)
+    assert run.x_end.item() - start == pytest.approx(stop, abs=4.0 * np.spacing(start))
+
+
+def test_a_large_ring_near_its_bottom_is_a_belt():
+    radius = 1e7
+    friction = {"law": "stiction", "rough": {"mu_s": 0.5, "mu_k": 0.4}, "elsewhere": {"mu_s": 0.2, "mu_k": 0.1}}
+    ring = {
+        "model": "ring-single-contact",
+        "body": {"mass": 1.0},
+        "ring": {"radius": radius},
+        "friction": friction,
+        "zone": {"center": 0.3 / radius, "half_angle": 0.1 / radius},
+        "initial": {"omega": 1.5 / radius},
+        "time": {"span": 1.0},
+        "classify": {"epsilon_omega": 0.0},
+    }
+    belt = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), period=2.0 * np.pi * radius, start=(0.0, 1.5), span=1.0)
+    assert outcome(ring).phi_end.item() * radius == pytest.approx(outcome(belt).x_end.item(), rel=1e-6)
+
+
+LAWS = [
+    ("stiction", {}, {}),
+    ("bengisu-akay", {"alpha": 10.0, "v0": 0.02}, {"method": "rk4", "steps": 100_000}),
+]
+
+
+@pytest.mark.parametrize("frame", ["belt", "space"])
+@pytest.mark.parametrize(("law", "parameters", "solver"), mostly_slow(LAWS, LAWS[:1]))
+def test_mirror_image_of_zones_moves_as_the_body_in_the_mirror(law, parameters, solver, frame):
+    found = []
+    for sign in (1.0, -1.0):
+        zones = [(0.2 * sign, 0.15, 0.6, 0.3), (-0.3 * sign, 0.1, 0.1, 0.05)]
+        scene = with_zones(
+            zones, (0.4, 0.25), frame, 1.3, law, stiffness=8.0, force=(3.0 * sign, 0.4), start=(0.1 * sign, 0.3 * sign)
+        )
+        scene["friction"] |= parameters
+        found.append(ringsweep.sweep(scene, {"belt.velocity": sign * np.linspace(0.05, 0.5, 6)}, progress=False))
+        if solver:
+            axis = {"belt.velocity": sign * np.linspace(0.05, 0.5, 6)}
+            coarse = ringsweep.sweep(scene, axis, solver=solver, progress=False)
+            assert np.allclose(coarse.x_end, found[-1].x_end, rtol=0.0, atol=1e-5)
+    run, image = found
+    assert np.allclose(run.x_end, -image.x_end.values, rtol=0.0, atol=1e-9)
+    assert np.allclose(run.velocity_end, -image.velocity_end.values, rtol=0.0, atol=1e-9)
+    assert run.certified.all()
+
+
+def test_history_tells_the_zone_and_the_edges():
+    run = ringsweep.simulate(with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), "space", start=(0.0, 2.0)))
+    inside = (run.x > 0.2 + 1e-9) & (run.x < 0.4 - 1e-9)
+    assert (run.zone_1.values[inside.values] == 1).all()
+    assert inside.any()
+    edges = run.event_time.values[[kind == "edge" for kind in kinds(run)]]
+    before, after = (np.sqrt(4.0 - 2.0 * G * work) for work in (0.1 * 0.2, 0.1 * 0.2 + 0.4 * 0.2))
+    assert edges == pytest.approx([(2.0 - before) / 0.1 / G, (2.0 - before) / 0.1 / G + (before - after) / 0.4 / G])
+
+
+def kinds(run):
+    """Words of the events of a run."""
+    names = dict(zip(run.event_kind.attrs["flag_values"], run.event_kind.attrs["flag_meanings"].split(), strict=True))
+    return [names[kind] for kind in run.event_kind.values]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"belt": {"velocity": 0.0}}, "scene.belt.period: missing"),
+        ({"belt": {"velocity": 0.0, "period": 0.1}}, "half_length: 0.1 m is longer than half of belt.period"),
+        ({"friction": {"law": "dahl", "sigma0": 1e4}}, "scene.zones.0: not available with law dahl"),
+        ({"friction": {"law": "karnopp", "dead_band": 0.1}}, "scene.zones.0: not available with law karnopp"),
+        ({"friction": {"frame": "body"}}, "scene.friction.frame: .*is no frame of zones"),
+        ({"zones": [{"from": 0.1, "to": 0.2}]}, "half_length"),
+        ({"initial": {"steady": "slip"}}, "scene.initial.steady: not available with zones"),
+    ],
+)
+def test_mistakes_are_located(change, words):
+    scene = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1))
+    merged = {**scene, **change}
+    if "friction" in change:
+        merged["friction"] = {**scene["friction"], **change["friction"]}
+        if change["friction"].get("law") == "dahl":
+            merged["friction"]["elsewhere"], merged["zones"] = {"mu_k": 0.1}, [{"half_length": 0.1, "mu_k": 0.2}]
+    with pytest.raises(ringsweep.InputError, match=words):
+        ringsweep.sweep(merged, {}, progress=False)
+
+
+def test_length_and_period_are_axes_of_points():
+    scene = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), start=(0.0, 2.0))
+    axes = {"zones.0.half_length": [0.05, 0.1], "belt.period": xr.DataArray([0.7, 0.9], dims="cell")}
+    run = ringsweep.sweep(scene, axes, progress=False).transpose("zones_0_half_length", "cell")
+    for i, half in enumerate((0.05, 0.1)):
+        for j, period in enumerate((0.7, 0.9)):
+            stop = where_it_stops(2.0 / G, 0.3 - half, 0.3 + half, period, 0.4, 0.1)
+            assert run.x_end.values[i, j] == pytest.approx(stop, rel=1e-12)
