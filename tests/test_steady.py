@@ -106,7 +106,7 @@ class TestHopfBifurcation:
         assert found.damper_coefficient.item() == pytest.approx(-G * stribeck(slope, 0.5, 0.3, 0.1)[1], rel=1e-3)
 
     @pytest.mark.slow
-    def test_critical_stiffness_of_friction_that_ages_is_that_of_rice_and_ruina(self):
+    def test_critical_stiffness_of_friction_that_ages_is_the_published_one(self):
         """k_c = F_N (b - a)/D_c (1 + m v^2/(F_N a D_c))."""
         law = {"law": "dieterich", "mu0": 0.6, "a": 0.01, "b": 0.015}
         law |= {"critical_distance": 1e-4, "reference_velocity": 1e-6}
