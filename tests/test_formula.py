@@ -192,7 +192,7 @@ REFUSED = [
     ),
     (LEINE | {"detla": 3}, "detla: unknown key; did you mean `delta`?"),
     # The keys of this law, not of all laws.
-    (LEINE | {"extra": 3}, "...(known: law, laws, mu, at_rest, mu_s, delta, viscous)"),
+    (LEINE | {"extra": 3}, "...(known: law, laws, mu, at_rest, frame, mu_s, delta, viscous, elsewhere, rough)"),
     (formula("mu_s/(1 + V/w)", w=1), "V: missing"),
     (formula("mu_s/(1 + V/w)", w=1), "...did you mean `v` in the formula, the sliding speed?"),
     # Friction at rest.

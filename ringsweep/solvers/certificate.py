@@ -109,7 +109,8 @@ class TwoRuns:
             if unit == "m s-1":
                 least = least + largest["m"] / own_scales["s"]
             if unit == "rad s-2":
-                by_motion = largest["rad s-1"] ** 2 if "rad" in units else largest["m s-1"] / own_scales["s"]
+                with np.errstate(over="ignore"):
+                    by_motion = largest["rad s-1"] ** 2 if "rad" in units else largest["m s-1"] / own_scales["s"]
                 least = least + by_motion
             of_unit = [k for k, other in enumerate(units) if other == unit]
             largest[unit] = np.fmax.reduce(sizes[:, of_unit], axis=1, initial=0.0) + least
