@@ -78,7 +78,7 @@ def friction_coefficients(
 
 
 def zone_parameters(structure: Structure, zone: type, rest: str) -> dict[str, Parameter]:
-    """Parameters of the zones, of type :class:`zones.Arc` or :class:`zones.Stretch`, and of the `rest`, by path."""
+    """Parameters of zones (:class:`zones.Arc` or :class:`zones.Stretch`), of the `rest` and of the law, by path."""
     places = {f"friction.{structure.elsewhere}": rest}
     if structure.arcs == ("zone",):
         places["friction.rough"] = "the zone"
@@ -88,6 +88,7 @@ def zone_parameters(structure: Structure, zone: type, rest: str) -> dict[str, Pa
     for place, where in places.items():
         for name, p in friction.coefficients_of(structure.law_type).items():
             found[f"{place}.{name}"] = replace(p, long_name=f"{p.long_name} of {where}")
+    found |= {f"friction.{name}": p for name, p in declared(structure.law_type).items()}
     for arc in structure.arcs:
         for name, p in declared(zone).items():
             found[f"{arc}.{name}"] = replace(p, long_name=p.long_name.replace("the zone", places.get(arc, "the zone")))

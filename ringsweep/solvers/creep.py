@@ -27,9 +27,6 @@ INSTANTS = 4
 # Matrix that turns the values at the ends of these parts into the coefficients of a polynomial.
 _INTERPOLATION = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1.0, INSTANTS + 1), increasing=True)))
 
-# Error of the instant of an event, as a share of the step that shows it, in units of the tolerance.
-_EVENT_ERROR = 1e-3
-
 # Factor by which the relative error of the acceleration on bristles may exceed the relative error of the state.
 _ACCELERATION_FACTOR = 100.0
 
@@ -114,13 +111,12 @@ def _guard_after(scene, start, scratch, h, g):
 
 
 @inlined
-def _locate(scene, start, scratch, h, ends, g, guess, precision):
+def _locate(scene, start, scratch, h, ends, g, guess):
     """Length of the step after which guard `g` is zero.
 
     `ends` are the values of the guard before the step and after a step of length `h`; the second one is not positive.
-    `guess` is the length of the step by the dense output, or zero if it does not tell. `precision` is the error that
-    the length may have, as a share of `h`; after a step of the length found the guard is not positive. Each value of
-    the guard comes from a step of the method, not from dense output.
+    `guess` is the length of the step by the dense output, or zero if it does not tell. Each value of the guard comes
+    from a step of the method, not from dense output.
     """
     (f_low, f_high), low, high = ends, 0.0, h
     if f_low <= 0.0:
@@ -148,7 +144,7 @@ def _locate(scene, start, scratch, h, ends, g, guess, precision):
             before, f_before, far, f_far = far, f_far, near, f_near
         near, f_near = s, f
         width = abs(far - near)
-        least = 0.5 * precision * h
+        least = 0.5e-14 * h
         if width <= 2.0 * least:
             break
         place, height = (near - far) / (before - far), (f_near - f_far) / (f_before - f_far)
@@ -186,7 +182,7 @@ def _may_vanish(near_zero, first, middle, last):
 
 
 @inlined
-def _first_event_by_samples(scene, start, scratch, taken, views, precision):
+def _first_event_by_samples(scene, start, scratch, taken, views):
     """First guard to fall below zero within an implicit step, and the length of the step up to it.
 
     If none does: -1, and the length of the whole step.
@@ -194,7 +190,7 @@ def _first_event_by_samples(scene, start, scratch, taken, views, precision):
     A guard is taken as the polynomial through its values at five instants of the dense output, whose degree is four as
     well. Its first root is isolated like the root of a series, so that no dip between two instants is missed.
 
-    `views` are those at the beginning, in the middle and at the end of the step, `precision` that of :func:`_locate`.
+    `views` are those at the beginning, in the middle and at the end of the step.
     """
     (before, within, after), s = views, taken.h
     near_zero = implicit.near_zero(scene, within[1])
@@ -218,7 +214,7 @@ def _first_event_by_samples(scene, start, scratch, taken, views, precision):
         if value_below > 0.0 or value_below == before[0][g] == 0.0:
             continue
         ends = before[0][g], value_below
-        found = _locate(scene, start, scratch, h_below, ends, g, s * root, precision)
+        found = _locate(scene, start, scratch, h_below, ends, g, s * root)
         if event < 0 or found < h_event * (1.0 - 1e-12):
             event, h_event = g, found
     return event, h_event
@@ -360,8 +356,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])
         if not near:
             break
-        precision = max(1e-14, _EVENT_ERROR * tolerance)
-        event, h = _first_event_by_samples(scene, start, scratch, taken, (before, middle, after), precision)
+        event, h = _first_event_by_samples(scene, start, scratch, taken, (before, middle, after))
         if event < 0 or h == 0.0:
             break
         near = False

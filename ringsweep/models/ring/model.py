@@ -144,10 +144,8 @@ class SingleContactRing(Model, Continues):
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Parameters of a scene of this structure, by path."""
-        law = structure.law_type
         found = dict(self.body)
         found |= zone_parameters(structure, zones.Arc, "the rest of the ring")
-        found |= {f"friction.{name}": p for name, p in declared(law).items()}
         found |= {f"drive.{name}": p for name, p in declared(structure.drive_type).items()}
         return found | {
             "initial.phi": Parameter("rad", "angle of the body at launch", default=0.0),
