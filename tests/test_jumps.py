@@ -70,7 +70,7 @@ def test_body_keeps_its_velocity_where_that_of_the_belt_jumps():
 
 def test_millionth_knot_is_as_exact_as_the_first():
     force = {"formula": "A*sign(sin(w*t + p))", "A": 1.0, "w": 7.3, "p": 0.4}
-    drive = take(cells_of(belt(None, force)), 0).drive.force
+    drive = take(cells_of(belt(None, force)), 0).drive.added
     turns, share = drive.knots[0, 0, 0], drive.knots[0, 0, 1]
     for n in (1, 10**6, 10**9):
         exact = (n + Fraction(share)) / Fraction(turns)

@@ -35,7 +35,7 @@ class Forced(NamedTuple):
     ----------
     motion : NamedTuple
         Drive that moves the belt.
-    force : NamedTuple
+    added : NamedTuple
         Drive whose "angle" is the part of the force that varies, N.
     constant : float
         The constant part, N.
@@ -44,7 +44,7 @@ class Forced(NamedTuple):
     """
 
     motion: Any
-    force: Any
+    added: Any
     constant: Leaf
     largest: Leaf
 
@@ -57,8 +57,9 @@ class Laden(NamedTuple):
 
     Attributes
     ----------
-    forced : Forced
-    load : NamedTuple
+    motion : Forced
+        Drive and force.
+    added : NamedTuple
         Drive whose "angle" is the load, N.
     largest : float
         Bound on the magnitude of the force, N.
@@ -66,8 +67,8 @@ class Laden(NamedTuple):
         Bound on the load from below, N.
     """
 
-    forced: Any
-    load: Any
+    motion: Any
+    added: Any
     largest: Leaf
     least_load: Leaf
 
@@ -81,7 +82,7 @@ def load_rate(drive, load, forcing):
 @feature("0.0", of=Laden)
 def expand_load(drive, t, order, load, work):
     """Fill the Taylor series of the load about time `t`; see :func:`expand_force`. Nothing without such a load."""
-    drives.expand_at(drive.load, t, order, load, work)
+    drives.expand_at(drive.added, t, order, load, work)
     return 0.0
 
 
@@ -144,7 +145,7 @@ def expand_force(drive, t, order, force, work):
 @expand_force.implements(Forced)
 def _expand_force_of_forced(drive, t, order, force, work):
     """Implement :func:`expand_force`."""
-    drives.expand_at(drive.force, t, order, force, work)
+    drives.expand_at(drive.added, t, order, force, work)
     force[0] += drive.constant
 
 
@@ -155,7 +156,7 @@ def _expand_force_of_forced(drive, t, order, force, work):
 def _turn_of_forced(drive, t):
     """Implement :func:`drives.turn`, and the rate of the force, N/s, and the force, N."""
     theta, omega, epsilon = drives.turn(drive.motion, t)
-    force, rate, _ = drives.turn(drive.force, t)
+    force, rate, _ = drives.turn(drive.added, t)
     return theta, omega, epsilon, rate, force + drive.constant
 
 
@@ -164,7 +165,7 @@ def _turn_near_of_forced(drive, course, now, s):
     """Implement :func:`drives.turn_near`, and the rate of the force, N/s, and the force, N."""
     # The course is that of the motion.
     theta, omega, epsilon = drives.turn_near(drive.motion, course, now, s)
-    force, rate, _ = drives.turn(drive.force, later(now, s))
+    force, rate, _ = drives.turn(drive.added, later(now, s))
     return theta, omega, epsilon, rate, force + drive.constant
 
 
@@ -172,17 +173,17 @@ def _turn_near_of_forced(drive, course, now, s):
 def _table_row_of_forced(drive, t):
     """Implement :func:`drives.table_row`: the row of the motion, and the shape of the force."""
     s, rate = drives.table_row(drive.motion, t)
-    return s, rate, drives.shape(drive.force, t)[0]
+    return s, rate, drives.shape(drive.added, t)[0]
 
 
 @drives.lookup.implements(Forced)
 def _lookup_of_forced(drive, table, k):
     """Implement :func:`drives.lookup`, and the force, N."""
     theta, omega = drives.lookup(drive.motion, table, k)
-    return theta, omega, drives.amplitude(drive.force) * table[k, 2] + drive.constant
+    return theta, omega, drives.amplitude(drive.added) * table[k, 2] + drive.constant
 
 
-@drives.expand.implements(Forced)
+@drives.expand.implements(Forced, Laden)
 def _expand_motion_of_forced(drive, t, order, theta, work):
     """Implement :func:`drives.expand`: of the motion."""
     drives.expand_at(drive.motion, t, order, theta, work)
@@ -195,143 +196,87 @@ def _time_for_forced(drive, t):
     return t
 
 
-@drives.jerk.implements(Forced)
+@drives.jerk.implements(Forced, Laden)
 def _jerk_of_forced(drive, t):
     """Implement :func:`drives.jerk`: of the motion."""
     return drives.jerk_at(drive.motion, t)
 
 
-@drives.next_knot.implements(Forced)
+@drives.next_knot.implements(Forced, Laden)
 def _next_knot_of_forced(drive, t):
-    """Implement :func:`drives.next_knot`: of motion or force, whichever is first."""
-    return min(drives.next_knot(drive.motion, t), drives.next_knot(drive.force, t))
+    """Implement :func:`drives.next_knot`: of the motion or of what is added, whichever is first."""
+    return min(drives.next_knot(drive.motion, t), drives.next_knot(drive.added, t))
 
 
-@drives.knot_after.implements(Forced)
+@drives.knot_after.implements(Forced, Laden)
 def _knot_after_of_forced(drive, t):
     """Implement :func:`drives.knot_after`."""
-    of_motion, of_force = drives.knot_after(drive.motion, t), drives.knot_after(drive.force, t)
-    return of_force if is_after(of_motion, of_force) else of_motion
+    of_motion, of_added = drives.knot_after(drive.motion, t), drives.knot_after(drive.added, t)
+    return of_added if is_after(of_motion, of_added) else of_motion
 
 
-@drives.held_of.implements(Forced)
+@drives.held_of.implements(Forced, Laden)
 def _held_of_forced(drive):
     """Implement :func:`drives.held_of`: of both."""
-    return joined(drives.held_of(drive.motion), drives.held_of(drive.force))
+    return joined(drives.held_of(drive.motion), drives.held_of(drive.added))
 
 
-@drives.pass_knot.implements(Forced)
+@drives.pass_knot.implements(Forced, Laden)
 def _pass_knot_of_forced(drive, t):
     """Implement :func:`drives.pass_knot`: of both."""
     of_motion = drives.pass_knot(drive.motion, t)
-    return drives.pass_knot(drive.force, t) or of_motion
+    return drives.pass_knot(drive.added, t) or of_motion
 
 
-@drives.least_jump.implements(Forced)
+@drives.least_jump.implements(Forced, Laden)
 def _least_jump_of_forced(drive):
     """Implement :func:`drives.least_jump`: of the motion."""
     return drives.least_jump(drive.motion)
 
 
-@drives.beginning.implements(Forced)
+@drives.beginning.implements(Forced, Laden)
 def _beginning_of_forced(drive):
     """Implement :func:`drives.beginning`: of the motion."""
     return drives.beginning(drive.motion)
 
 
-@drives.period.implements(Forced)
+@drives.period.implements(Forced, Laden)
 def _period_of_forced(drive):
     """Implement :func:`drives.period`: the common one; infinite if there is none."""
-    return common_period(drives.period(drive.motion), drives.force_period(drive.force))
+    return common_period(drives.period(drive.motion), drives.force_period(drive.added))
 
 
 @expand_force.implements(Laden)
 def _expand_force_of_laden(drive, t, order, force, work):
     """Implement :func:`expand_force`."""
-    expand_force(drive.forced, t, order, force, work)
+    expand_force(drive.motion, t, order, force, work)
 
 
 @drives.turn.implements(Laden)
 def _turn_of_laden(drive, t):
     """Implement :func:`drives.turn`, and the rates, N/s, and values, N, of load and force."""
-    theta, omega, epsilon, rate, force = drives.turn(drive.forced, t)
-    load, rate_of_load, _ = drives.turn(drive.load, t)
+    theta, omega, epsilon, rate, force = drives.turn(drive.motion, t)
+    load, rate_of_load, _ = drives.turn(drive.added, t)
     return theta, omega, epsilon, rate, rate_of_load, load, force
 
 
 @drives.turn_near.implements(Laden)
 def _turn_near_of_laden(drive, course, now, s):
     """Implement :func:`drives.turn_near`, and the rates, N/s, and values, N, of load and force."""
-    theta, omega, epsilon, rate, force = drives.turn_near(drive.forced, course, now, s)
-    load, rate_of_load, _ = drives.turn(drive.load, later(now, s))
+    theta, omega, epsilon, rate, force = drives.turn_near(drive.motion, course, now, s)
+    load, rate_of_load, _ = drives.turn(drive.added, later(now, s))
     return theta, omega, epsilon, rate, rate_of_load, load, force
 
 
 @drives.table_row.implements(Laden)
 def _table_row_of_laden(drive, t):
     """Implement :func:`drives.table_row`: the row of motion and force, and the shape of the load."""
-    s, rate, force = drives.table_row(drive.forced, t)
-    return s, rate, force, drives.shape(drive.load, t)[0]
+    s, rate, force = drives.table_row(drive.motion, t)
+    return s, rate, force, drives.shape(drive.added, t)[0]
 
 
 @drives.lookup.implements(Laden)
 def _lookup_of_laden(drive, table, k):
     """Implement :func:`drives.lookup`, and load and force, N."""
-    theta, omega, force = drives.lookup(drive.forced, table, k)
-    return theta, omega, drives.amplitude(drive.load) * table[k, 3], force
-
-
-@drives.expand.implements(Laden)
-def _expand_motion_of_laden(drive, t, order, theta, work):
-    """Implement :func:`drives.expand`: of the motion."""
-    drives.expand_at(drive.forced, t, order, theta, work)
-
-
-@drives.jerk.implements(Laden)
-def _jerk_of_laden(drive, t):
-    """Implement :func:`drives.jerk`: of the motion."""
-    return drives.jerk_at(drive.forced, t)
-
-
-@drives.knot_after.implements(Laden)
-def _knot_after_of_laden(drive, t):
-    """Implement :func:`drives.knot_after`."""
-    of_motion, of_load = drives.knot_after(drive.forced, t), drives.knot_after(drive.load, t)
-    return of_load if is_after(of_motion, of_load) else of_motion
-
-
-@drives.held_of.implements(Laden)
-def _held_of_laden(drive):
-    """Implement :func:`drives.held_of`: of all."""
-    return joined(drives.held_of(drive.forced), drives.held_of(drive.load))
-
-
-@drives.pass_knot.implements(Laden)
-def _pass_knot_of_laden(drive, t):
-    """Implement :func:`drives.pass_knot`: of all."""
-    of_motion = drives.pass_knot(drive.forced, t)
-    return drives.pass_knot(drive.load, t) or of_motion
-
-
-@drives.least_jump.implements(Laden)
-def _least_jump_of_laden(drive):
-    """Implement :func:`drives.least_jump`: of the motion."""
-    return drives.least_jump(drive.forced)
-
-
-@drives.next_knot.implements(Laden)
-def _next_knot_of_laden(drive, t):
-    """Implement :func:`drives.next_knot`: of motion, force or load, whichever is first."""
-    return min(drives.next_knot(drive.forced, t), drives.next_knot(drive.load, t))
-
-
-@drives.beginning.implements(Laden)
-def _beginning_of_laden(drive):
-    """Implement :func:`drives.beginning`: of the motion."""
-    return drives.beginning(drive.forced)
-
-
-@drives.period.implements(Laden)
-def _period_of_laden(drive):
-    """Implement :func:`drives.period`: the common one; infinite if there is none."""
-    return common_period(drives.period(drive.forced), drives.force_period(drive.load))
+    theta, omega, force = drives.lookup(drive.motion, table, k)
+    return theta, omega, drives.amplitude(drive.added) * table[k, 3], force

@@ -167,7 +167,10 @@ class Belt(Model, Continues):
             found[f"drive.{name}"] = _along_a_line(name, p) if structure.own_drive is None else p
         found["force.constant"] = forces.CONSTANT
         if structure.own_load is not None:
-            found |= {f"body.load.{name}": p for name, p in declared(structure.own_load).items()}
+            of_load = {
+                n: replace(p, long_name=f"parameter {n} of the load") for n, p in declared(structure.own_load).items()
+            }
+            found |= {f"body.load.{name}": p for name, p in of_load.items()}
         elif structure.load is not None:
             found["body.load.amplitude"] = replace(forces.FACTOR, long_name="factor on the load of the table")
         if structure.own_force is not None:
