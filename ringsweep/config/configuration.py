@@ -312,5 +312,5 @@ def _child(node: Any, key: str, full: str) -> Any:
         return node[key]
     if isinstance(node, list) and key.isdecimal() and len(key) < 10 and int(key) < len(node):
         return node[int(key)]
-    stands = "" if isinstance(node, list) else f": {show(node)} stands where a section must: write one in the configuration"
+    stands = "" if isinstance(node, list) else f": {show(node)} stands in place of a section: write one there"
     raise InputError(full, f"cannot be set: there is no `{key}` on this path{stands}")
