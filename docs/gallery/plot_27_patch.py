@@ -32,6 +32,6 @@ figure = plots.regime_map(maps)
 
 # %%
 # A belt that is alike everywhere (the lowest and the highest row) drags the body into steady sliding if it is fast
-# enough; a patch of any other length keeps it swinging. Below about 0.12 m/s the body sticks in every period, however
+# enough; a patch of any other length keeps it swinging. Below about 0.09 m/s the body sticks in every period, however
 # long the patch is. Beyond, tongues of stick-slip reach to higher speeds where patches pass the body at a fraction of
 # its natural frequency, 1 Hz: near 0.31 m/s about a third of it, if the patch covers about half of the belt.
