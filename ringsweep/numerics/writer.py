@@ -484,6 +484,32 @@ def is_polynomial(node: Node) -> bool:
     return _degree(node) is not None
 
 
+def _rows_of(rate: Node) -> tuple[list[Node], dict[Node, int], set[Node], dict[Node, list[Node]]]:
+    """Rate and slopes that need a series, row of each series, expressions that are sums, coefficients of polynomials.
+
+    Sums and multiples that one expression uses are written into it. A factor of a product has a row; of two polynomials
+    whose product has too high a degree, one.
+    """
+    found = [rate]
+    for node in found:
+        slopes = [derivative(part) for part in nodes_of(node) if part.varies and part.kind in _FUNCTIONS]
+        found += [slope for slope in slopes if slope not in found]
+    every = nodes_of(*found)
+    others = [node for node in every if not is_polynomial(node)]
+    users = Counter([part for node in others for part in set(node.parts)])
+    users.update(derivative(node) for node in others if node.kind in _FUNCTIONS)
+    products = [node for node in others if node.kind == "divide" or (node.kind == "multiply" and node.parts[0].varies)]
+    rows = {part for node in products for part in node.parts if not is_polynomial(part)}
+    rows |= {node.parts[1] for node in products if node.kind == "multiply" and not rows.intersection(node.parts)}
+    linear = {node for node in others if node.kind == "add" or (node.kind == "multiply" and not node.parts[0].varies)}
+    rows |= {node for node in others if node not in linear or users[node] > 1}
+    place = {node: i for i, node in enumerate(node for node in every if node in rows)}
+    needed = {part for node in others if node.kind not in _FUNCTIONS for part in node.parts} | {rate}
+    needed |= {derivative(node) for node in others if node.kind in _FUNCTIONS}
+    coefficients = {node: _coefficients(node) for node in every if node in needed and is_polynomial(node)}
+    return found, place, linear, coefficients
+
+
 def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, factor: str) -> list[str]:
     """Body that fills the array ``theta`` with the power series of an expression in the variable, up to ``order``.
 
@@ -506,27 +532,9 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, f
         If there are more series than the scratch has rows.
     """
     writer = _Writer(names)
-    found = [rate]
-    for node in found:
-        slopes = [derivative(part) for part in nodes_of(node) if part.varies and part.kind in _FUNCTIONS]
-        found += [slope for slope in slopes if slope not in found]
-    every = nodes_of(*found)
-    others = [node for node in every if not is_polynomial(node)]
-    users = Counter([part for node in others for part in set(node.parts)])
-    users.update(derivative(node) for node in others if node.kind in _FUNCTIONS)
-    # Sums and multiples that one expression uses are written into it. A factor of a product has a row; of two
-    # polynomials whose product has too high a degree, one.
-    products = [node for node in others if node.kind == "divide" or (node.kind == "multiply" and node.parts[0].varies)]
-    rows = {part for node in products for part in node.parts if not is_polynomial(part)}
-    rows |= {node.parts[1] for node in products if node.kind == "multiply" and not rows.intersection(node.parts)}
-    linear = {node for node in others if node.kind == "add" or (node.kind == "multiply" and not node.parts[0].varies)}
-    rows |= {node for node in others if node not in linear or users[node] > 1}
-    place = {node: i for i, node in enumerate(node for node in every if node in rows)}
+    found, place, linear, coefficients = _rows_of(rate)
     if len(place) > SERIES_ROWS:
         raise OverflowError
-    needed = {part for node in others if node.kind not in _FUNCTIONS for part in node.parts} | {rate}
-    needed |= {derivative(node) for node in others if node.kind in _FUNCTIONS}
-    coefficients = {node: _coefficients(node) for node in every if node in needed and is_polynomial(node)}
     numbers = [one for several in coefficients.values() for one in several]
     writer.constants(value, *found, *numbers)
     _write_for_floats(writer, [value, *place, *numbers], side)

@@ -311,6 +311,19 @@ def _store_row(scene, step, c, s, y, history, count):
     return count + 1
 
 
+@inlined
+def _store_step(scene, step, c, just_switched, history, count):
+    """Store the rows of a step, the first of them only if its mode has just begun, and return the number of rows."""
+    if step.s > 0.0:
+        parts = 1 if step.is_implicit else int(step.s / history.spacing) + 1
+        for part in range(0 if just_switched else 1, parts + 1):
+            state = step.y if part == 0 else step.y_next
+            # Rounded otherwise, the end of a mode would not be the instant at which the next one begins.
+            at = step.s if part == parts else step.s * part / parts
+            count = _store_row(scene, step, c, at, state, history, count)
+    return count
+
+
 class Results(NamedTuple):
     """Arrays that the runs of a batch fill.
 
@@ -414,13 +427,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             if len(history.times) > 0:
                 if count == len(history.times):
                     return count
-                if s > 0.0:
-                    parts = 1 if is_implicit else int(s / spacing) + 1
-                    for part in range(0 if just_switched else 1, parts + 1):
-                        state = y if part == 0 else y_next
-                        # Rounded otherwise, the end of a mode would not be the instant at which the next one begins.
-                        at = s if part == parts else s * part / parts
-                        count = _store_row(scene, step, c, at, state, history, count)
+                count = _store_step(scene, step, c, just_switched, history, count)
             just_switched = guard >= 0 or (just_switched and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
@@ -454,8 +461,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         recorder.keep_memory(scene, rows[i], len(outcome), y)
         steps[i] = n
         if audited:
-            audits[i, 0] = audit.violation
-            audits[i, 1] = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
-            audits[i, 2] = guard_fall_rate
+            unexplained = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
+            _copy_into(audits[i], (audit.violation, unexplained, guard_fall_rate))
             _copy_into(audits[i, 3:], local)
     return count
