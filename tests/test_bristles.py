@@ -197,21 +197,9 @@ class TestHysteresis:
         assert again == pytest.approx(low, rel=1e-6)
         assert work == pytest.approx(4 * MU_K**2 / SIGMA_0 * (u - tanh(u)), rel=1e-4)
 
-    def test_dahls_loop_has_a_cubic_area_if_small_and_coulombs_area_if_large(self):
-        small, smaller = (self.area(u * MU_K / SIGMA_0)[0] for u in (0.04, 0.02))
-        assert log(small / smaller) / log(2) == pytest.approx(3.0, abs=0.01)
-        large = 200 * MU_K / SIGMA_0
-        assert self.area(large, points=400)[0] == pytest.approx(4 * MU_K * large, rel=1 / 150)
-
     def test_loop_of_dahl_does_not_depend_on_the_speed(self):
         one, other = (self.area(MU_K / SIGMA_0, speed)[0] for speed in (1e-4, 10.0))
         assert one == pytest.approx(other, rel=1e-9)
-
-    def test_lugre_reaches_mu_s_at_low_and_mu_k_at_high_speed(self):
-        slow, fast = (
-            deflections_along(LUGRE, (0.0, 20 * LONGEST), speed=speed)[-1] for speed in (1e-3 * V_S, 10 * V_S)
-        )
-        assert (SIGMA_0 * slow, SIGMA_0 * fast) == pytest.approx((MU_S, MU_K), rel=1e-5)
 
 
 class TestResetIntegrator:
@@ -264,11 +252,6 @@ class TestRandomBonds:
     def test_friction_of_random_bonds_does_not_depend_on_the_speed(self):
         for v in (1e-9, 1.0):
             assert bristle(random_bonds(), MU_K, MU_K, v, 1e-4, 1.0, BAND)[::3] == (v, SIGMA_0 * 1e-4)
-
-    def test_mean_stretch_of_a_bond_is_the_deflection_at_which_it_snaps(self):
-        """Because the mean deflection of new bonds is zero."""
-        run, _ = slide(random_bonds(11.0), 20_000)
-        assert run[400:, 0].mean() * BONDS == pytest.approx(24 / 11 * MU_K / SIGMA_0, rel=0.01)
 
     def test_first_bond_snaps_after_about_half_the_snapping_deflection(self):
         """Bonds start at most at half of it, apart from their mean, which is subtracted: traction starts at zero."""
