@@ -1,14 +1,17 @@
 """Runs side by side in vector lanes: functions against the C library, and runs against single runs."""
 
-from math import inf, radians
+from math import inf
 
 import numpy as np
 import pytest
+import xarray as xr
+from belts import on_belt, with_all_parts
 from hypothesis import given
 from hypothesis import strategies as st
 from solutions import made
 from tiers import mostly_slow
 
+import ringsweep
 from ringsweep.compile import kernel, take
 from ringsweep.models import MODELS
 from ringsweep.models.parts import exceeds, larger_eigenvalue
@@ -23,11 +26,10 @@ from ringsweep.numerics.functions import (
 )
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import conform, read_lanes, side_by_side, write
-from ringsweep.physics.friction import LAWS, Dynamic, coefficients_of, family_of
+from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.physics.friction.velocity import friction_at, steepest, stiction_band
 from ringsweep.quantities.parameters import declared
-from ringsweep.solvers import rk4
 from ringsweep.solvers.rk4 import RK4
 
 NAMES = MODELS["ring"].outcomes
@@ -163,80 +165,37 @@ class TestFriction:
         assert 0.998 * np.abs(slopes).max() <= beyond <= 1.012 * np.abs(slopes).max()
 
 
-#: Parameters of each law that rk4 takes, mild enough for a constant step.
-OF_LAW = {
+#: Each way in which a law enters a step, with parameters that are mild enough for a constant step. TestFriction has the
+#: formula of each law, and `test_relations` a ring.
+MILD = {
     "stiction": {},
-    "tustin": {"alpha": 10.0},
     "karnopp": {"dead_band": 0.02},
-    "threlfall": {"v0": 0.2},
-    "piecewise-linear": {"v0": 0.1, "v1": 0.3},
-    "piecewise-cubic": {"v0": 0.1, "v1": 0.3},
     "bengisu-akay": {"v0": 0.2, "alpha": 100.0},
-    "dahl": {"sigma0": 100.0},
-    "lugre": {"sigma0": 100.0, "sigma1": 1.0, "sigma2": 0.1, "v_s": 0.1},
     "elasto-plastic": {"sigma0": 100.0, "sigma1": 1.0, "sigma2": 0.1, "v_s": 0.1},
     "reset-integrator": {"sigma0": 100.0, "sigma1": 1.0},
 }
-WITHOUT_STATIC = {law for law in OF_LAW if "mu_s" not in coefficients_of(LAWS[law])}
-
-#: Models and laws that ``rk4`` takes.
-#: Each way in which a law enters a step; TestFriction has the formula of each law.
-SCENES = [
-    *(("belt", law) for law in ("stiction", "karnopp", "bengisu-akay", "lugre", "reset-integrator")),
-    # The bristles of dahl and of lugre are those of elasto-plastic without its threshold.
-    *(("ring", law) for law in ("stiction", "bengisu-akay", "elasto-plastic")),
-    ("ring-single-contact", "bengisu-akay"),
-]
 
 
-def family(cells, model="ring", law="bengisu-akay", count=40):
-    """Cells with random drives, surfaces and launches, which slip, stick, reverse and separate."""
+@pytest.mark.slow
+@pytest.mark.parametrize("law", MILD)
+def test_neighbours_of_a_run_change_no_bit_of_it(law):
     rng = np.random.default_rng(7)
-    values = {f"friction.{name}": value for name, value in OF_LAW[law].items()}
-    if model == "belt":
-        values |= {"body.mass": 1.0, "spring.stiffness": rng.uniform(20.0, 60.0, count), "friction.mu_k": 0.1}
-        values |= {"drive.amplitude": rng.uniform(-0.5, 0.5, count), "initial.x": rng.uniform(-0.2, 0.2, count)}
-        values |= {} if law in WITHOUT_STATIC else {"friction.mu_s": rng.uniform(0.1, 0.3, count)}
-        if law in ("lugre", "karnopp"):
-            # Other tests compile these kernels too, for a belt with these parts.
-            values |= dict.fromkeys(("spring.cubic", "damper.coefficient", "force.amplitude", "force.frequency"), 0.0)
-        return cells(values | {"time.span": 3.0}, law=law, drive="constant", model=model, arcs=())
-    values |= {
-        "drive.amplitude": rng.uniform(0.1, 8.0, count),
-        "zone.half_angle": rng.uniform(radians(2.0), radians(60.0), count),
-        "initial.omega": rng.uniform(-20.0, 20.0, count),
-        "time.span": 3.0 if law == "bengisu-akay" else 1.0,
-    }
-    return cells(values, drive="arctan", model=model, law=law)
+    axes = {"belt.velocity": rng.uniform(-0.5, 0.5, 40), "spring.stiffness": rng.uniform(20.0, 60.0, 40)}
+    scene = with_all_parts(on_belt({"law": law, "mu_s": 0.2, "mu_k": 0.1, **MILD[law]}, velocity=0.1, span=3.0))
 
+    def ends(cells):
+        columns = {path: xr.DataArray(column[cells], dims="cell") for path, column in axes.items()}
+        return ringsweep.sweep(scene, columns, solver={"method": "rk4", "steps": 3000}, jobs=1, progress=False)
 
-def integrate(batch, steps, names, *, order=None):
-    """Outcomes of the cells of a batch, side by side in a given order."""
-    cells = len(batch.span)
-    results = rk4.Results(np.empty((cells, len(names))), np.empty((cells, 5)))
-    order = np.arange(cells) if order is None else order
-    rk4.integrate(rk4.Diagnosed(), *rk4.prepare(batch), take(batch.drive, 0), order, steps, results)
-    columns = zip(("steps", "stiffness", "slack", "fall", "stride"), results.report.T, strict=True)
-    return dict(zip(names, results.rows.T, strict=True)) | dict(columns)
-
-
-class TestEachLane:
-    @pytest.mark.parametrize(("model", "law"), mostly_slow(SCENES, [("ring", "bengisu-akay")]))
-    def test_neighbours_of_a_run_change_no_bit_of_it(self, cells, model, law):
-        batch, names = family(cells, model, law), MODELS[model].outcomes
-        together = integrate(batch, 6000, names)
-        assert len(set(together["regime"])) > 1 or model != "ring"
-        shuffled = integrate(batch, 6000, names, order=np.random.default_rng(1).permutation(len(batch.span)))
-        single = {i: integrate(take(batch, [i]), 6000, names) for i in (0, 17, 39)}
-        for name in together:
-            np.testing.assert_array_equal(shuffled[name], together[name], err_msg=name)
-            for i, one in single.items():
-                np.testing.assert_array_equal(one[name][0], together[name][i], err_msg=name)
+    together, order = ends(np.arange(40)), rng.permutation(40)
+    assert len(np.unique(together.slips)) > 3
+    for cells in (order, *([i] for i in (0, 17, 39))):
+        xr.testing.assert_equal(ends(cells), together.isel(cell=cells))
 
 
 @pytest.mark.slow
 def test_outcomes_do_not_depend_on_diagnosis(cells):
-    batch = family(cells)
+    batch = cells({"friction.v0": 0.2, "friction.alpha": 100.0, "drive.amplitude": np.linspace(0.1, 8.0, 40)})
     kept, dropped = (RK4(1000, certify=False, diagnose=diagnose).run(batch, NAMES) for diagnose in (True, False))
     # Another kernel may fuse other products and sums.
     np.testing.assert_allclose(dropped.rows, kept.rows, rtol=1e-13)
