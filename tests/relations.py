@@ -192,6 +192,8 @@ MAGNITUDES: dict[str, tuple[float, float]] = {
     r"seed": (1.0, 1.0),
     r"restitution": (0.1, 0.95),
     r"stops.(low|high)": (0.03, 1.0),
+    r"belt.period": (1.0, 3.0),
+    r"half_length": (0.02, 0.5),
     r"shift": (0.01, 1.0),
 }
 

@@ -60,6 +60,10 @@ KINDS = {
     "belt-two-way": Kind(
         "belt", "stiction", force="harmonic", parts=LOADS, span=(2, 20), two_way=BOTH, record={"exponent": True}
     ),
+    "belt-two-way-smooth": Kind("belt", "bengisu-akay", force="harmonic", span=(2, 20), two_way=BOTH),
+    "belt-two-way-band": Kind("belt", "karnopp", force="harmonic", span=(2, 20), two_way=BOTH),
+    "belt-zones": Kind("belt", "stiction", force="harmonic", parts=("belt.period",), arcs=2, span=(2, 20)),
+    "belt-zones-smooth": Kind("belt", "bengisu-akay", force="harmonic", parts=("belt.period",), arcs=1, span=(2, 20)),
     "belt-dieterich": Kind("belt", "dieterich", force="harmonic", parts=("initial.contact_age",), span=(1, 8)),
     "belt-stops": Kind("belt", "stiction", force="harmonic", parts=SPRING, impact=True, span=(2, 20)),
     "belt-stops-smooth": Kind("belt", "bengisu-akay", force="harmonic", parts=LOADS, impact=True, span=(2, 20)),

@@ -138,24 +138,11 @@ def test_random_bodies_between_stops_move_along_parabolas():
     points = {path: column.tolist() for path, column in axes.items()} | {"friction.mu_s": [0.3] * cells}
     config = {"scene": between(-1.0, 1.0, stiffness=0.0, mu_k=0.1, span=1.0), "sweep": {"points": points}}
     found = ringsweep.run(config, progress=False)
-    mirror = {
-        "stops.low": (-axes["stops.high"]).tolist(),
-        "stops.high": (-axes["stops.low"]).tolist(),
-        **{path: (-axes[path]).tolist() for path in ("initial.x", "initial.velocity", "belt.velocity")},
-    }
-    config["sweep"] = {"points": points | mirror}
-    other = ringsweep.run(config, progress=False)
-    own = np.array(
-        [
-            by_parabolas(x, u, belt, G * mu, low, high, e, span)
-            for x, u, belt, mu, low, high, e, span in zip(*axes.values(), strict=True)
-        ]
-    )
+    cells = zip(*axes.values(), strict=True)
+    own = np.array([by_parabolas(x, u, v, G * mu, low, high, e, t) for x, u, v, mu, low, high, e, t in cells])
     assert own[:, 2].max() > 4
     np.testing.assert_array_equal(found.impacts, own[:, 2])
     np.testing.assert_allclose(np.array([found.x_end, found.velocity_end]).T, own[:, :2], atol=1e-10)
-    np.testing.assert_array_equal(-other.x_end, found.x_end)
-    np.testing.assert_array_equal(-other.x_min, found.x_max)
 
 
 class TestMistakes:

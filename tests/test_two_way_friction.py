@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 from belts import on_belt, outcome
 from scipy.optimize import brentq
-from tiers import mostly_slow
 
 import ringsweep
 
@@ -69,39 +68,6 @@ def test_two_equal_numbers_are_one_number():
     axes = {"force.amplitude": np.linspace(1.0, 9.0, 12)}
     runs = [ringsweep.sweep(conveyor(f, stiffness=3.0), axes, progress=False)[[*NAMES]] for f in (one, two)]
     xr.testing.assert_identical(*(run.drop_attrs() for run in runs))
-
-
-LAWS = [
-    ("stiction", {}, "auto"),
-    ("karnopp", {"dead_band": 0.02}, "auto"),
-    ("tustin", {"alpha": 3.0}, "auto"),
-    ("bengisu-akay", {"alpha": 10.0, "v0": 1e-3}, "implicit"),
-    ("bengisu-akay", {"alpha": 10.0, "v0": 1e-2}, {"method": "rk4", "steps": 40000}),
-    ("formula", {"mu": "mu_k + (mu_s - mu_k)/(1 + (v/w)**2)", "at_rest": "mu_s", "w": 0.1}, "auto"),
-]
-
-
-@pytest.mark.parametrize(("law", "parameters", "solver"), mostly_slow(LAWS, LAWS[:1]))
-def test_mirror_image_exchanges_the_two_ways(law, parameters, solver):
-    coefficients = {"friction.mu_s": (0.4, 0.25), "friction.mu_k": (0.3, 0.1)}
-    found = []
-    for sign in (1, -1):
-        points = {"belt.velocity": sign * np.linspace(0.05, 0.5, 6)}
-        for path, pair in coefficients.items():
-            points |= {
-                f"{path}.{way}": np.full(6, mu) for way, mu in zip(("forward", "backward"), pair[::sign], strict=True)
-            }
-        scene = conveyor(
-            {"law": law, **parameters}, stiffness=8.0, force=(3.0 * sign, 0.4), start=(0.1 * sign, 0.3 * sign), span=6.0
-        )
-        axes = {path: xr.DataArray(column, dims="cell") for path, column in points.items()}
-        found.append(ringsweep.sweep(scene, axes, solver=solver, progress=False))
-    run, image = found
-    assert (run.slips == image.slips).all()
-    assert run.certified.any()
-    for name, other in (("x_end", "x_end"), ("velocity_end", "velocity_end"), ("x_min", "x_max")):
-        assert np.allclose(run[name], -image[other], rtol=0.0, atol=1e-9)
-    assert np.allclose(run.stick_time, image.stick_time, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.slow
