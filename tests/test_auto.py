@@ -370,16 +370,3 @@ class TestTime:
         found = solve(Auto(), cells(changes, drive="power"))
         assert (found.regime[0], found.separating_contact[0]) == (SEPARATING, 1)
         assert found.t_separation[0] < 1e-12
-
-    @pytest.mark.slow
-    def test_oscillating_drive_gives_two_reversals_in_each_of_many_periods(self, cells):
-        """Reversals and the share of stick are the same in a short and in a long run."""
-        changes = {"drive.amplitude": 0.2, "drive.frequency": 4.5, "zone.half_angle": 0.0}
-        spans = np.array([10.0, 1000.0])
-        found = solve(Auto(), cells(changes | {"time.span": spans}, law="stiction", drive="sinusoidal"))
-        np.testing.assert_array_equal(found.regime, OSCILLATORY)
-        np.testing.assert_allclose(found.reversals, 2 * 4.5 * spans, atol=1)
-        share = found.stick_time / spans
-        assert 0.1 < share[1] < 0.9
-        assert share[0] == pytest.approx(share[1], rel=0.05)
-        assert found.certified.all()

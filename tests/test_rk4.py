@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from solutions import imbalance
 
 from ringsweep.compile import take
 from ringsweep.models.ring.record import Outcome
@@ -110,27 +109,6 @@ class TestOrder:
         assert order == pytest.approx(4.0, abs=0.1)
 
 
-class TestEnergy:
-    """The energy of the body changes by the work of friction, also across edges and reversals."""
-
-    @pytest.mark.slow
-    def test_energy_changes_by_the_work_of_friction(self, cells, history):
-        changes = {
-            "drive.amplitude": 5.0,
-            "initial.omega": 10.0,
-            "friction.alpha": 5.0,
-            "friction.v0": 0.1,
-            "zone.half_angle": 1.0,
-        }
-        batch = cells(changes, drive="arctan")
-        histories = [history(batch, steps) for steps in (1000, 4000, 16000)]
-        residuals = [imbalance(batch, run, ((0.2, 0.1), (0.5, 0.3))) for run in histories]
-        assert residuals[2] < 5e-4
-        assert residuals[2] < residuals[0] / 8
-        assert {0.0, 1.0} == set(histories[2].zone_1) == set(histories[2].zone_2)
-        assert (np.diff(np.sign(histories[2].omega)) != 0).any()
-
-
 @pytest.mark.slow
 class TestSingleContact:
     """A loop without friction."""
@@ -198,41 +176,8 @@ class TestFigures:
             assert (found.stiffness > 100 * STABILITY_LIMIT) == stiff
             assert found.certified == (not stiff)
 
-    @pytest.mark.slow
-    @pytest.mark.parametrize(
-        ("number", "step", "t_end", "phi_end"),
-        [(30, 2e-7, 1.28477, 1.29125), (31, 1e-7, 0.14977, 2.04373), (33, 2e-7, 0.1727, 8.554)],
-    )
-    def test_figure_at_a_step_that_resolves_the_band(self, figure, cells, run, number, step, t_end, phi_end):
-        drive, changes, _ = figure(number)
-        found = run(cells(changes, drive=drive), round(changes["time.span"] / step))
-        assert found.stiffness < STABILITY_LIMIT
-        assert (found.regime, found.separating_contact) == (SEPARATING, 2)
-        assert found.t_end == pytest.approx(t_end, abs=5e-5)
-        assert found.phi_end == pytest.approx(phi_end, abs=2e-4)
-
 
 class TestBatch:
-    """The outcome of a cell does not depend, in any bit, on the cells that run beside it."""
-
-    def test_cells_with_other_drives_do_not_change_an_outcome(self, cells, run):
-        columns = {
-            "drive.exponent": np.array([1.1, 2.0, 1.1, 3.0, 2.0, 1.1]),
-            "drive.amplitude": np.array([20.0, 20.0, 3.0, 20.0, 20.0, 20.0]),
-            "time.span": np.array([0.1, 0.1, 0.1, 0.1, 0.3, 0.3]),
-        }
-
-        def build(values):
-            return cells(values, drive="power")
-
-        together = run(build(columns), 1500, certify=True)
-        for i in range(6):
-            alone = run(build({path: column[i] for path, column in columns.items()}), 1500, certify=True)
-            np.testing.assert_array_equal(together.rows[i], alone.rows[0])
-            for name in ("steps", "stiffness", "certified"):
-                assert getattr(together, name)[i] == getattr(alone, name)[0], name
-        assert len(set(together.phi_end)) == 6
-
     def test_separated_run_takes_no_more_steps_while_others_go_on(self, cells, run):
         batch = cells({"initial.omega": np.array([16.0, 100.0, 16.0])})
         found = run(batch, 5000)
@@ -310,17 +255,6 @@ class TestEnd:
             found = run(coulomb({"initial.omega": 10.0, "time.span": 1e-6}, mu), 10)
             assert (found.regime == JAMMED) == jammed
             assert (found.t_end == 0.0) == jammed
-
-    def test_body_jams_where_a_contact_reaches_a_rough_arc(self, cells, run):
-        changes = {"friction.rough.mu_s": 3.0, "friction.rough.mu_k": 3.0, "zone.center": 1.5, "initial.omega": 30.0}
-        batch = cells(changes)
-        body = take(batch.body, 0)
-        found = run(batch, 20000)
-        assert found.regime == JAMMED
-        assert found.motion == RESTING
-        assert found.separating_contact == 0
-        assert found.phi_end == pytest.approx(1.5 - np.radians(15.0) - body.beta, abs=2e-3)
-        assert np.isnan(found.t_separation)
 
     def test_run_that_overflows_is_failed(self, cells, coulomb, run):
         omega = np.array([1e150, 1e160, -1e200, nan])

@@ -176,31 +176,3 @@ class TestRungeKutta:
         slow, fast = result.stiffness
         assert 0.0 < slow < STABILITY_LIMIT < fast
         assert not result.certified[1]
-
-    def test_rk4_does_not_certify_a_stiction_band_too_narrow_for_its_step(self, cells):
-        v0 = np.geomspace(1e-12, 1.0, 25)
-        result, _ = self.run(cells({"friction.v0": v0, "drive.amplitude": 2.0}, drive="arctan"), 1500)
-        assert not result.certified[result.stiffness > STABILITY_LIMIT].any()
-        assert not result.certified[0]
-        assert result.certified[-1]
-
-
-class TestEnergy:
-    """Without friction and drive a body launched from the bottom conserves its energy."""
-
-    OMEGA = 10.0
-
-    def drift(self, cells, method, law, span):
-        changes = {"initial.omega": self.OMEGA, "time.span": span}
-        found = solve(method, cells(FRICTIONLESS | changes, law=law, drive="arctan"))
-        assert found.regime == OSCILLATORY
-        kinetic = (found.omega_end / self.OMEGA) ** 2
-        potential = 2.0 * OWN**2 * 9.81 * (1.0 - np.cos(found.phi_end)) / self.OMEGA**2
-        return abs(kinetic + potential - 1.0)[0], found.steps[0]
-
-    @pytest.mark.parametrize(("law", "method"), [("bengisu-akay", Implicit), ("stiction", Event)])
-    def test_energy_drift_of_event_and_implicit_is_within_summed_tolerances(self, cells, law, method):
-        """The drift is less than the tolerance of a step times the number of steps."""
-        for rtol in (1e-7, 1e-10):
-            drift, steps = self.drift(cells, method(rtol, certify=False), law, 1000.0)
-            assert drift < steps * rtol
