@@ -140,7 +140,7 @@ class Belt(Model, Continues):
             "body.normal_stiffness": Parameter(
                 "N/m", "growth of the normal reaction with the displacement (default: 0)", optional=True
             ),
-            "spring.stiffness": Parameter("N/m", "stiffness of the spring", lower=0.0),
+            "spring.stiffness": Parameter("N/m", "stiffness of the spring, 0 without one", lower=0.0),
             "spring.cubic": Parameter("N/m^3", "cubic stiffness of the spring (default: 0)", optional=True),
             "damper.coefficient": Parameter(
                 "N s/m", "coefficient of the damper to the wall (default: 0)", lower=0.0, optional=True
