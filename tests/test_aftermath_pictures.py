@@ -9,13 +9,11 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from matplotlib.quiver import Quiver
-from matplotlib.text import Text
 from rings import course, particle, rubs, shape
 
 import ringsweep
 from ringsweep import plots
 from ringsweep.plots.datasets import FLIGHT, PIVOT, phases
-from ringsweep.plots.films import _Film
 from ringsweep.plots.look import AFTERMATH_COLOURS
 from ringsweep.plots.rig import ring_history
 from ringsweep.quantities.flags import AFTERMATHS, OPEN, TUMBLED
@@ -120,20 +118,6 @@ class TestOffTheRace:
         np.testing.assert_allclose(weight.get_offsets()[0], ball.center, rtol=1e-6)
         assert axes.get_title().endswith("flight")
 
-    @pytest.mark.slow
-    def test_film_moves_the_body_off_the_race_under_a_whole_title(self, run, tmp_path):
-        words = (
-            "separating (oscillatory), contact 2, t = 1.28478 s, then tumbled, with 8 losses of contact and 178 impacts"
-        )
-        run = run.assign_attrs(outcome=words)
-        plots.save_animation(run, tmp_path / "film.gif", fps=2, duration=2, progress=False)
-        assert (tmp_path / "film.gif").stat().st_size > 1000
-        figure = _Film(run, 2.0, 1.0)
-        figure.draw_without_rendering()
-        (title,) = (text for text in figure.findobj(Text) if text.get_text().startswith("separating"))
-        box = title.get_window_extent()
-        assert figure.subfigs[1].bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
-
 
 class TestHistory:
     def test_panels_below_show_gaps_and_impacts_and_all_shade_open_contacts(self, run):
@@ -162,17 +146,6 @@ class TestHistory:
         after = plots.history(run.sel(time=slice(0.2, 0.9))).axes
         assert not [line for line in after[3].lines if line.get_marker() == "o"]
         assert after[5].get_xlim() == (pytest.approx(0.2, abs=0.01), pytest.approx(0.9, abs=0.01))
-
-    @pytest.mark.parametrize("width", [85, 170])
-    def test_nothing_of_a_printed_history_is_cut_off(self, run, width):
-        plots.style("print", width=width)
-        figure = plots.history(run.assign(t_separation=1.285))
-        figure.draw_without_rendering()
-        plots.style()
-        for axes in figure.axes:
-            for artist in filter(None, [axes.xaxis.label, axes.yaxis.label, axes.get_legend()]):
-                box = artist.get_window_extent()
-                assert -1 < box.x0 <= box.x1 < figure.bbox.x1 + 1
 
     def test_laws_have_a_panel_for_the_gap_of_each_contact(self, run):
         one = run.drop_dims(["impact", "event"]).drop_vars(["aftermath", "regime"])
