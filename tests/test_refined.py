@@ -204,7 +204,6 @@ class TestConfiguration:
             ({"strid": 8}, "sweep.refine.strid", "did you mean `stride`"),
             ({"stride": 0}, "sweep.refine.stride", "at least 1"),
             ({"audit": 2}, "sweep.refine.audit", "at most 1"),
-            ({"axes": ["body.mass"]}, "sweep.refine.axes.0", "no axis of numbers"),
             (3, "sweep.refine", "a section with keys"),
         ],
     )

@@ -184,7 +184,6 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(axes.COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(_VALUE), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
-    refined = _keys(neighbours.REFINE, axes=_list(names, maxItems=2))
     grid = "path -> values; every combination is run; paths with commas between them vary together"
     of_laws = {LAW: laws | {"uniqueItems": True}}
     points = "CSV file whose columns are paths and whose rows are runs, or its columns"
@@ -195,7 +194,7 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     return _section(
         {
             "grid": _open(grid, axis, propertyNames=together, properties=of_laws),
-            "refine": _any(_FLAG, _section(refined), description=boundaries),
+            "refine": _any(_FLAG, _section(_keys(neighbours.REFINE)), description=boundaries),
             "follow": _any(_TEXT, followed, description=which),
             "sample": _sample(together, axis),
             "points": _any(_TEXT, columns, description=points),

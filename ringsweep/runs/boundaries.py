@@ -202,8 +202,7 @@ def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int 
     values = {dim: columns[dim].values.tolist() for dim in dims} | {name: [value] for name, value in fixed.items()}
     sweep: dict[str, Any] = {"grid": {columns[name].attrs["path"]: along for name, along in values.items()}}
     if refine := source["sweep"].get("refine"):
-        # Along the axes that are left, whichever were named.
-        sweep["refine"] = refine if refine is True else {key: refine[key] for key in refine if key != "axes"}
+        sweep["refine"] = refine
     found = compute(load(source | {"sweep": sweep}), Execution(jobs, progress=False))
     return found.isel(dict.fromkeys(fixed, 0))
 
