@@ -381,6 +381,10 @@ ROCKING = {"law": "sinusoidal", "amplitude": "60 deg", "frequency": "2 Hz"}
         ({"ring__radius": "43.378 mm"}, None),
         ({"ring__radius": 1.0}, None),
         ({"ring__radius": 43.378}, "scene.ring.radius is 43.378 m and scene.body.ball_radius is 0.01 m: is a unit"),
+        ({"drive": ROCKING | {"amplitude": 60}}, "scene.drive.amplitude is 60 rad, 9.55 turns: is a unit missing?"),
+        ({"drive": ROCKING | {"amplitude": "60 rad"}}, None),
+        ({"drive": ROCKING | {"amplitude": "3600 deg"}}, None),
+        ({"drive": ROCKING | {"amplitude": 6.0}}, None),
     ],
 )
 def test_number_whose_unit_may_be_missing_gives_one_warning(told, changes, text):
@@ -404,6 +408,12 @@ def test_plain_number_in_the_place_of_another_unit_is_told(told, setting, messag
     scene = edited(drive=ROCKING, ring__radius="50 mm")
     lines = [f"--set {setting} is taken as {message.format(setting)}"] if message else []
     assert told(with_values, {"scene": scene}, [setting]) == lines
+
+
+def test_axis_of_a_file_with_angles_of_many_turns_gives_a_warning(told, write):
+    rocking = TEXT.replace("law: arctan", "law: sinusoidal\n    frequency: 1")
+    (found,) = told(load, write(rocking.replace("geomspace: [0.1, 10, 5]", "linspace: [10, 60, 5]")))
+    assert "scene.drive.amplitude is 60 rad" in found
 
 
 NEAR = "`amplitude`? (known: law", "`mu_k`? (known: mu_k"

@@ -13,11 +13,11 @@ from types import MappingProxyType
 from typing import Any
 
 from ringsweep.config import yaml_text
-from ringsweep.config.axes import Axes, build_axes, check_consistency, columns_of, sweep_section, swept_paths
+from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
 from ringsweep.config.continued import FROM, put_state, run_to_continue
 from ringsweep.config.neighbours import Follow, Refinement, read_follow, read_refinement, with_direction
 from ringsweep.config.options import read_solver
-from ringsweep.config.scene import as_named, parse_scene, sweepable
+from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import suggestion, warn_once
 from ringsweep.config.uncertain import Sample, read_sample
 from ringsweep.config.yaml_text import Document, scalar
@@ -225,11 +225,22 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     if len(excluding) > 1:
         problem = f"cannot stand beside {excluding[1]}, {_NEEDS[excluding[1]]}; leave one of them out"
         raise InputError(excluding[0], problem)
+    # Axes that a program gives are in SI units.
+    _warn_of_units(scene, changed, columns if doc.columns is None and doc.locations else ())
+    axes = with_direction(axes, follow)
+    return Config(scene, solver, axes, tree, doc.name, refine, sample, follow, begins_from=file)
+
+
+def _warn_of_units(scene: Scene, changed: Mapping[str, tuple[Any, Any]], columns: Iterable[Given]) -> None:
+    """Say where a unit may be missing: in what a user has changed, and in angles of many turns on an axis."""
     known = sweepable(scene)
     for full, (before, value) in changed.items():
         if (path := full.removeprefix("scene.")) in known:
             tell_unit("--set", f"{path}={{}}", value, before, known[path])
-    return Config(scene, solver, with_direction(axes, follow), tree, doc.name, refine, sample, follow, begins_from=file)
+    for path, _, _, given in columns:
+        # Of linspace and geomspace, first and last.
+        for value in next(iter(given.values()))[:2] if isinstance(given, dict) else given:
+            warn_of_plain_angle(path, value, known[path])
 
 
 def _apply_settings(doc: Document, settings: Iterable[Setting]) -> dict[str, tuple[Any, Any]]:

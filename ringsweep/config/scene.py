@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
+from math import pi
 from types import MappingProxyType
 from typing import Any
 
@@ -21,13 +22,16 @@ from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.formula import COEFFICIENTS, NAMES
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.units import is_plain, quantity, show
 
 #: Values of ``initial.steady``.
 STEADY = {"slip": "the body rests in space, where spring, friction and constant forces balance"}
 
 # Ratio of lengths of one scene above which a unit may be wrong: 1 m in place of 1 mm.
 _LARGEST_RATIO = 1000.0
+
+# Angle in rad above which a plain number may have been meant in degrees: two turns.
+_LARGEST_ANGLE = 4.0 * pi
 
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
@@ -89,9 +93,13 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     }
     values = _read_numbers(structures, leaves, swept)
     _warn_of_unused_numbers(structures, leaves)
+    numbers = numbers_of(structures)
     # Lengths of a friction law are those of asperities.
-    lengths = [path for path, p in numbers_of(structures).items() if p.unit == "m" and not path.startswith("friction.")]
+    lengths = [path for path, p in numbers.items() if p.unit == "m" and not path.startswith("friction.")]
     _warn_of_lengths({path: values[path] for path in lengths if path in values})
+    for path, parameter in numbers.items():
+        if path in leaves:
+            warn_of_plain_angle(path, leaves[path], parameter)
     return Scene(structures, values, scene)
 
 
@@ -240,6 +248,15 @@ def _warn_of_lengths(lengths: Mapping[str, float]) -> None:
         (short, small), (long, large) = given[0], given[-1]
         message = "scene.%s is %g m and scene.%s is %g m: is a unit missing? A plain number is in metres"
         warn_once(message, large, long, small, short)
+
+
+def warn_of_plain_angle(path: str, given: Any, parameter: Parameter | Choice) -> None:
+    """Warn of an angle of many turns that has no unit: it may have been meant in degrees."""
+    # Other than angles without limits are refused if they are this large.
+    is_angle = isinstance(parameter, Parameter) and parameter.unit == "rad" and is_plain(given)
+    if is_angle and abs(angle := float(given)) > _LARGEST_ANGLE:
+        message = "scene.%s is %g rad, %.3g turns: is a unit missing? A plain number is in radians; write `%g deg` for "
+        warn_once(message + "degrees", path, angle, abs(angle) / (2.0 * pi), angle)
 
 
 def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
