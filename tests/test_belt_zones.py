@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import on_belt, outcome
+from test_functions_of_time import cells_of
 
 import ringsweep
 
@@ -147,6 +148,15 @@ def test_mistakes_are_located(change, words):
             merged["friction"]["elsewhere"], merged["zones"] = {"mu_k": 0.1}, [{"half_length": 0.1, "mu_k": 0.2}]
     with pytest.raises(ringsweep.InputError, match=words):
         ringsweep.sweep(merged, {}, progress=False)
+
+
+@pytest.mark.parametrize("load", [None, {"formula": "Q*sin(u*t)", "Q": "1 N", "u": f"{np.pi} rad/s"}])
+def test_a_rocking_belt_with_zones_has_the_period_that_force_and_load_share_with_it(load):
+    scene = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), force=(1.0, 0.5))
+    scene["belt"].pop("velocity")
+    scene["drive"] = {"law": "sinusoidal", "amplitude": 0.1, "frequency": 1.5}
+    scene["body"] |= {"load": load} if load else {}
+    assert cells_of(scene).forcing_period == pytest.approx(2.0)
 
 
 def test_length_and_period_are_axes_of_points():

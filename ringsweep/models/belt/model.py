@@ -235,7 +235,7 @@ class Belt(Model, Continues):
         # A section may state a period of its own.
         period = np.broadcast_to(drives.period(forced), mass.shape)
         if structure.arcs and structure.frame == "belt":
-            period = _among_zones(structure, values, drive, forced, period)
+            period = _among_zones(values, drive, forced, period)
         if structure.section is not None or not isinstance(forced, drives.Constant) or period.any():
             fields["excited"] = belt.Excited()
         if structure.section is not None:
@@ -440,14 +440,14 @@ def _surface(structure: Structure, values: Values) -> Any:
     return surface_from(structure, values, zones.Stretch, period)
 
 
-def _among_zones(
-    structure: Structure, values: Values, drive: Any, forced: Any, period: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Period of drive and force, s, if the zones move with the belt: they must return too; 0 if nothing moves."""
+def _among_zones(values: Values, drive: Any, forced: Any, period: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Period of drive, force and load, s, if the zones move with the belt: they must return too; 0 if nothing moves."""
     if not isinstance(drive, drives.Constant):
         # The place of the belt must return, as the angle of a ring, not only its velocity.
-        of_force = drives.force_period(forced.force) if forced is not drive else 0.0
-        return np.broadcast_to(common_period(drives.force_period(drive), of_force), period.shape)
+        found = drives.force_period(drive)
+        while forced is not drive:
+            found, forced = common_period(found, drives.force_period(forced.added)), forced.motion
+        return np.broadcast_to(found, period.shape)
     speed = np.abs(drive[0])
     turn = np.divide(values["belt.period"], speed, out=np.zeros(len(speed)), where=speed > 0.0)
     return np.broadcast_to(common_period(turn, period), period.shape)
