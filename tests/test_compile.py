@@ -15,7 +15,7 @@ from numba.core.codegen import JITCPUCodegen
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
 import ringsweep
-from ringsweep.compile import cache, feature, numba_private, readable_compile_errors
+from ringsweep.compile import cache, feature, numba_private, readable_compile_errors, take
 from ringsweep.compile.cache import IN_KERNELS, sources_digest
 from ringsweep.errors import InputError
 
@@ -35,6 +35,13 @@ def edited(path):
 
 class Spring(NamedTuple):
     stiffness: float
+
+
+def test_an_array_that_stands_in_a_batch_twice_is_still_one_in_some_of_its_cells():
+    stiffness = np.arange(6.0).reshape(3, 2)
+    one, (other,) = take((Spring(stiffness), (Spring(stiffness),)), np.array([0, 2]))
+    assert one.stiffness is other.stiffness
+    np.testing.assert_array_equal(one.stiffness, stiffness[[0, 2]])
 
 
 class Rope(NamedTuple):

@@ -145,6 +145,36 @@ def test_random_bodies_between_stops_move_along_parabolas():
     np.testing.assert_allclose(np.array([found.x_end, found.velocity_end]).T, own[:, :2], atol=1e-10)
 
 
+@pytest.mark.slow
+class TestJumps:
+    """Forces and velocities of the belt that jump while the body is between its stops, or at one."""
+
+    @staticmethod
+    def outcomes(numbers, axes, mu, start, span):
+        scene = between(high=1.0, e=0.5, mu_k=mu, stiffness=0.0, start=start, span=span)
+        drive = {"law": "formula", "theta": "b*max(t - t1, 0)", "t1": 1.0} | numbers
+        force = {"formula": "piecewise(t < t2, B, A)", "t2": 2.0, "A": 0.0, "B": 0.0}
+        return ringsweep.sweep(scene | {"belt": {}, "drive": drive, "force": force}, axes, progress=False)
+
+    def test_a_body_flies_on_along_a_parabola_as_the_force_jumps(self):
+        """It hits at 1 s and is half way back at 2 s. The cells of a batch have knots of their own."""
+        pull = np.linspace(-3.0, 3.0, 20)
+        found = self.outcomes({"b": 0.7}, {"force.A": pull}, 0.0, (0.0, 1.0), 2.4)
+        np.testing.assert_allclose(found.x_end, 0.5 - 0.5 * 0.4 + 0.08 * pull, atol=1e-12)
+        assert (found.impacts == 1).all()
+        assert found.certified.all()
+
+    def test_a_belt_that_jumps_to_a_speed_drags_a_body_off_its_stop(self):
+        """It stands still, then runs away from the stop at 0.5 m/s from 1 s on; a greater force holds the body."""
+        mu, s, push = 0.1, 0.2, np.linspace(0.2, 1.8, 15)
+        found = self.outcomes({"b": -0.5}, {"force.B": push}, mu, (1.0, 0.0), 1.0 + s)
+        gain = np.minimum(push - mu * G, 0.0)
+        np.testing.assert_allclose(found.x_end, 1.0 + 0.5 * gain * s * s, atol=1e-12)
+        np.testing.assert_allclose(found.velocity_end, gain * s, atol=1e-12)
+        np.testing.assert_allclose(found.stick_time, 1.0, atol=1e-12)
+        assert found.certified.all()
+
+
 class TestMistakes:
     """Scenes that cannot be run are refused with the path and the cause."""
 

@@ -144,9 +144,11 @@ def take(batch: Any, i: Any) -> Any:
     Returns
     -------
     nested tuple
-        `batch` with each array replaced by its row `i`.
+        `batch` with each array replaced by its row `i`. An array that stands in several places of the batch is still
+        one: kernels write to those that hold values between two knots of a drive.
     """
-    return map_leaves(lambda leaf: leaf[i], batch)
+    rows: dict[int, Any] = {}
+    return map_leaves(lambda leaf: rows[id(leaf)] if id(leaf) in rows else rows.setdefault(id(leaf), leaf[i]), batch)
 
 
 def _take_one(batch: Any, i: Any) -> Any:

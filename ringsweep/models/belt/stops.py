@@ -160,6 +160,17 @@ def _begin_between_stops(scene):
     return t, y, status, Mode(mode.sign, mode.region, mode.entry_guard, stop, ())
 
 
+@modes.after_jump.implements(StopBelt)
+def _after_jump_between_stops(scene, mode, t, y, jump):
+    """Implement :func:`modes.after_jump`; a body at rest at a stop stays there if it is still pressed."""
+    if mode.stop.rests != 0:
+        after, state = _at_rest(scene, t, mode.stop.rests, mode.stop)
+        return RUNNING, after, state
+    old = FreeMode(mode.sign, mode.region, mode.entry_guard, ())
+    status, new, state = modes.after_jump(scene.stops.free, old, t, y, jump)
+    return status, Mode(new.sign, new.region, new.entry_guard, mode.stop, ()), state
+
+
 @modes.switch.implements(StopBelt)
 def _switch_between_stops(scene, mode, guard, t, y):
     """Implement :func:`modes.switch`."""
