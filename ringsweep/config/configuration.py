@@ -6,7 +6,6 @@ Physics and solvers declare their parameters; error messages are made from these
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -20,7 +19,7 @@ from ringsweep.config.options import read_solver
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import suggestion, warn_once
 from ringsweep.config.uncertain import Sample, read_sample
-from ringsweep.config.yaml_text import Document, scalar
+from ringsweep.config.yaml_text import Document, Source, scalar
 from ringsweep.errors import InputError
 from ringsweep.models.scene import ELSEWHERE, LAW, Scene
 from ringsweep.quantities.parameters import Choice, Parameter
@@ -84,11 +83,7 @@ class Config:
 
 
 def load(
-    config: str | os.PathLike[str] | Mapping[str, Any],
-    settings: Iterable[Setting] = (),
-    *,
-    axes: Mapping[str, Any] | None = None,
-    **parts: Any,
+    config: Source, settings: Iterable[Setting] = (), *, axes: Mapping[str, Any] | None = None, **parts: Any
 ) -> Config:
     """Read and validate a configuration.
 
@@ -116,9 +111,7 @@ def load(
 
 
 def with_values(
-    config: str | os.PathLike[str] | Mapping[str, Any],
-    settings: Iterable[Setting] = (),
-    solver: str | Mapping[str, Any] | None = None,
+    config: Source, settings: Iterable[Setting] = (), solver: str | Mapping[str, Any] | None = None
 ) -> Config:
     """Configuration of a single run: without axes, and with some values changed.
 
@@ -157,11 +150,7 @@ def with_values(
             raise
 
 
-def _document(
-    config: str | os.PathLike[str] | Mapping[str, Any],
-    parts: Mapping[str, Any],
-    axes: Mapping[str, Any] | None = None,
-) -> Document:
+def _document(config: Source, parts: Mapping[str, Any], axes: Mapping[str, Any] | None = None) -> Document:
     """A configuration in which a program has put axes and other parts in the place of its own; see :func:`load`."""
     doc = yaml_text.read(config)
     if axes is not None:

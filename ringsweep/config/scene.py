@@ -155,13 +155,15 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
     found = Structure(model, "", drive, own_drive=own.drive_type(model, scene.get("drive", {})), impact=impact)
     if not _takes_force(model):
         return found
+    # That they are sections is made sure of where their keys are read.
+    friction, body = (one if isinstance(one := scene.get(key), dict) else {} for key in ("friction", "body"))
     return replace(
         found,
         own_force=own.force_type(scene.get("force")),
-        own_load=own.force_type(body.get("load"), "body.load") if isinstance(body := scene.get("body"), dict) else None,
+        own_load=own.force_type(body.get("load"), "body.load"),
         steady=_starts_steadily(scene, swept),
-        two_way=_two_way(scene, swept),
-        frame=_frame(scene),
+        two_way=_two_way(friction, swept),
+        frame=one_of(friction.get("frame", "belt"), FRAMES, "scene.friction.frame", "is no frame of zones"),
     )
 
 
@@ -177,17 +179,9 @@ def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
     return True
 
 
-def _frame(scene: dict[str, Any]) -> str:
-    """Frame of the zones of a belt."""
-    given = friction.get("frame", "belt") if isinstance(friction := scene.get("friction"), dict) else "belt"
-    one_of(given, FRAMES, "scene.friction.frame", "is no frame of zones")
-    return str(given)
-
-
-def _two_way(scene: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
+def _two_way(friction: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
     """Paths of the friction coefficients that the scene or the sweep gives for both directions of sliding."""
-    given = friction if isinstance(friction := scene.get("friction"), dict) else {}
-    split = {f"friction.{name}" for name, value in given.items() if isinstance(value, dict)}
+    split = {f"friction.{name}" for name, value in friction.items() if isinstance(value, dict)}
     split |= {path.rpartition(".")[0] for path in map(str, swept) if path.endswith(tuple(f".{way}" for way in WAYS))}
     return tuple(path for name in (*COEFFICIENTS, "scale") if (path := f"friction.{name}") in split)
 

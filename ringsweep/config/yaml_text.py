@@ -27,6 +27,9 @@ from ringsweep.quantities.variables import written
 
 logger = logging.getLogger("ringsweep")
 
+#: What a configuration is read from: a YAML or a result file, or the mapping that it would hold.
+Source = str | os.PathLike[str] | Mapping[str, Any]
+
 #: Largest number of values in a configuration, with each value counted as often as it occurs.
 MAX_VALUES = 1_000_000
 
@@ -152,7 +155,7 @@ def name_and_unit(header: str) -> tuple[str, str]:
     return (match[1], match[2] or "") if match else ("", "")
 
 
-def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
+def read(config: Source) -> Document:
     """Read a configuration from a YAML file, from a result file or from a mapping.
 
     Raises
