@@ -382,12 +382,6 @@ class TestExtremes:
         assert REGIMES[int(at_rest.regime)] == "riding"
         assert abs(float(at_rest.x_end)) < 1e-9
 
-    @pytest.mark.parametrize("law", ["coulomb", "stiction"])
-    def test_body_without_friction_oscillates_with_the_period_of_the_spring(self, law):
-        found = outcome(belt(law, mu_s=0.0, mu_k=0.0, span=60.0))
-        assert REGIMES[int(found.regime)] == "oscillatory"
-        assert float(found.period) == pytest.approx(2 * pi / sqrt(2.0), rel=1e-10)
-
     def test_largest_force_of_stiff_bristles_is_the_breakaway_force(self):
         for sigma_0 in (1e7, 1e9):
             of_law = {"sigma0": sigma_0, "sigma1": sqrt(sigma_0), "sigma2": 0.1, "v_s": 1e-3}
@@ -412,12 +406,6 @@ class TestRegimes:
             assert float(found.force_max) <= 1.4715 * (1 + 1e-9)
             assert float(found.x_min) < -0.8 * abs(x)
 
-    @pytest.mark.slow
-    @pytest.mark.parametrize("cycles", [2.4, 3.4, 5.4, 8.4])
-    def test_decaying_oscillation_is_sliding(self, cycles):
-        scene = belt("coulomb", viscous=0.3, start=0.0, span=cycles * 2 * pi / sqrt(2.0))
-        assert REGIMES[int(outcome(with_all_parts(scene)).regime)] == "sliding"
-
     @pytest.mark.parametrize("law", mostly_slow(["stiction", "bengisu-akay", "lugre", "dahl"], ("stiction", "lugre")))
     def test_body_that_sticks_to_the_end_is_sticking(self, law):
         of_law = TestExtremes.SMALL[law]
@@ -439,13 +427,6 @@ class TestRegimes:
         np.testing.assert_allclose(found.slips, (found.time_span - found.first_slip) // found.period[2] + 1, atol=1)
 
     @pytest.mark.slow
-    def test_body_that_creeps_to_equilibrium_is_sticking(self):
-        scene = belt("bengisu-akay", v_b=0.0, v0=0.01, alpha=100.0) | {"initial": {"x": 1.5, "velocity": 0.0}}
-        found = ringsweep.sweep(scene, {"time.span": [20.0, 60.0, 240.0, 1000.0]}, progress=False)
-        assert (found.regime == REGIMES.index("sticking")).all()
-        assert found.period.isnull().all()
-
-    @pytest.mark.slow
     def test_rk4_run_that_misses_the_first_stick_has_no_certificate(self):
         scene = belt(span=30.0) | {"initial": {"x": 0.5}}
         assert REGIMES[int(outcome(scene).regime)] == "stick-slip"
@@ -453,17 +434,6 @@ class TestRegimes:
             fixed = outcome(scene, method="rk4", steps=steps)
             assert REGIMES[int(fixed.regime)] == "oscillatory"
             assert fixed.certified == 0
-
-    @pytest.mark.slow
-    def test_body_that_sticks_to_an_oscillating_belt_is_riding(self):
-        scene = belt(k=0.5, span=60.0)
-        del scene["belt"], scene["initial"]
-        scene["spring"]["cubic"] = 0.0
-        scene["drive"] = {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.1}
-        found = outcome(scene)
-        assert float(found.stick_time) == pytest.approx(60.0, rel=1e-12)
-        assert REGIMES[int(found.regime)] == "riding"
-        assert found.settled == 1
 
     @pytest.mark.slow
     def test_rk4_step_whose_stages_cross_zero_velocity_has_no_certificate(self):

@@ -188,12 +188,6 @@ class TestPeriod:
         assert found.period.isnull().all()
         assert found.settled.values.tolist() == [0, 1]
 
-    def test_transient_leaves_no_trace_in_the_period(self):
-        """A large swing decays by reversals of friction, until the body oscillates with the period of the spring."""
-        found = runs(scene("coulomb", mu_k=0.1, belt=0.1, x=7.0, velocity=0.0), [60.0, 120.0])
-        assert words(found)[1] == "oscillatory"
-        assert float(found.period[1]) == pytest.approx(2.0 * pi / sqrt(2.0), rel=1e-9)
-
 
 @pytest.mark.slow
 def test_rk4_has_the_words_and_numbers_of_located_steps():

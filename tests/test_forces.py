@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from belts import by_scipy, on_belt
+from belts import by_scipy, on_belt, outcome
 from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 from solutions import cell_of
@@ -56,12 +56,6 @@ def end(scene, solver="auto"):
     run = ringsweep.simulate(scene, solver=solver, samples=50)
     assert run.certified == 1 or "certify" in solver
     return float(run.x_end), float(run.velocity_end)
-
-
-def outcome(scene, solver="auto"):
-    """Outcomes of a run."""
-    one = ringsweep.sweep(scene, {"time.span": [scene["time"]["span"]]}, solver=solver, progress=False)
-    return one.isel(time_span=0)
 
 
 def breakaway(run):
@@ -236,12 +230,6 @@ class TestPublished:
         rests = np.flatnonzero(run["mode"].values == 0)[0]
         assert float(run.time[rests]) == pytest.approx(22.42355635, abs=1e-9)
         assert float(run.x_end) == pytest.approx(0.6821789367, abs=1e-9)
-
-    @pytest.mark.parametrize(("t", "x", "velocity"), [(3.0, -2.1740, -0.3669), (12.4, -0.2028, 0.0331)])
-    def test_free_oscillation_with_dry_friction_is_where_it_was_published(self, t, x, velocity):
-        """y'' = -y - 0.4 sgn y' from (3, 0)."""
-        found = end(forced(friction=0.4, x=3.0, span=t))
-        np.testing.assert_allclose(found, (x, velocity), atol=1e-4)
 
 
 def everything(rng, law="stiction", *, table=False):
