@@ -726,37 +726,9 @@ def test_schema_refuses_wrong_keys_names_and_types(changes):
     assert not Draft202012Validator(schema()).is_valid({"scene": edited(**changes)})
 
 
-JUNK = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
-    max_leaves=8,
-)
-PATHS = st.sampled_from(
-    [
-        *("model", "body", "body__mass", "friction", "friction__law", "friction__rough", "zone", "zones"),
-        *("zone__half_angle", "ring__radius", "drive", "drive__law", "drive__time", "drive__file"),
-        *("initial", "time", "gravity", "unknown"),
-    ]
-)
-
-
 def accepted_or_refused(call, *arguments):
     with contextlib.suppress(InputError):
         call(*arguments)
-
-
-@settings(max_examples=75, deadline=None)
-@given(st.dictionaries(PATHS, JUNK.filter(lambda value: value is not None), max_size=3), JUNK, JUNK)
-def test_random_values_in_a_configuration_never_crash_the_reader(changes, solver, sweep):
-    scene = copy.deepcopy(SCENE)
-    for path, value in changes.items():
-        section, _, key = path.partition("__")
-        within = key and isinstance(scene.get(section), dict)
-        (scene[section] if within else scene)[key if within else section] = value
-    accepted_or_refused(load, {"scene": scene, "solver": SOLVER})
-    accepted_or_refused(load, {"scene": scene, "solver": SOLVER, "sweep": sweep})
-    accepted_or_refused(load, {"scene": SCENE, "solver": solver, "sweep": {"grid": sweep}})
-    accepted_or_refused(load, {"scene": SCENE, "solver": SOLVER, "sweep": {"grid": {"gravity": sweep}}})
 
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
