@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 from rings import course, rubs, shape
 from scipy.integrate import solve_ivp
+from solutions import cell_of, motion
 
 import ringsweep
 
@@ -51,40 +52,25 @@ class TestSlideThroughVanishingD:
     """Where D vanishes and the balances are not singular, the body slides on."""
 
     @staticmethod
-    def coefficients(phi, speed):
-        """Kinetic friction of both contacts of STEEP at a sliding speed."""
-        beta = np.radians(16.8)
-        under = [abs(angle - 0.4) < 0.6 for angle in (phi - beta, phi + beta)]
-        return [(0.4 + 0.5 * np.exp(-30 * speed)) if on else 0.03 + 0.02 * np.exp(-30 * speed) for on in under]
-
-    def balances(self, phi, omega):
-        """Angular acceleration, both reactions, and D, from the three printed balances in slip backwards."""
-        beta, reach, g, M, J = np.radians(16.8), 0.025 / np.sin(np.radians(16.8)), 9.81, 0.1, 2.5e-5
-        R, xi = reach + 0.01, reach * np.cos(beta)
-        K1, K2 = self.coefficients(phi, abs(omega) * R)
-        matrix = [
-            [0.0, np.cos(beta) - K1 * np.sin(beta), np.cos(beta) + K2 * np.sin(beta)],
-            [M * xi, -np.sin(beta) - K1 * np.cos(beta), np.sin(beta) - K2 * np.cos(beta)],
-            [J + M * xi**2, -R * K1, -R * K2],
-        ]
-        loads = [M * g * np.cos(phi) + M * xi * omega**2, -M * g * np.sin(phi), -M * g * xi * np.sin(phi)]
-        D = (K1 - K2) * np.cos(2 * beta) + (1 + K1 * K2) * np.sin(2 * beta)
-        return *np.linalg.solve(matrix, loads), D
+    def slip(body, phi, omega):
+        """Angular acceleration, both reactions, and D, from the balances of a body that slips backwards."""
+        under = [abs(angle - 0.4) < 0.6 for angle in (phi - body.beta, phi + body.beta)]
+        tail = np.exp(-30.0 * abs(omega) * body.radius)
+        K1, K2 = (0.4 + 0.5 * tail if rough else 0.03 + 0.02 * tail for rough in under)
+        D = (K1 - K2) * np.cos(2 * body.beta) + (1 + K1 * K2) * np.sin(2 * body.beta)
+        return *motion(body, K1, K2) @ (omega**2, np.cos(phi), np.sin(phi)), D
 
     def test_body_comes_to_rest_at_all_tolerances(self):
         def stops(t, y):
             return y[1]
 
         stops.terminal = True
-        reference = solve_ivp(
-            lambda t, y: (y[1], self.balances(*y)[0]), (0, 1), (0.3, -6.0), rtol=1e-11, atol=1e-12, events=stops,
-            max_step=1e-4,
-        )  # fmt: skip
-        phi, omega = reference.y
-        D = [self.balances(p, w)[3] for p, w in zip(phi[::10], omega[::10], strict=True)]
-        reactions = np.array([self.balances(p, w)[1:3] for p, w in zip(phi[::10], omega[::10], strict=True)])
+        body, options = cell_of(STEEP).body, {"rtol": 1e-11, "atol": 1e-12, "max_step": 1e-4}
+        reference = solve_ivp(lambda t, y: (y[1], self.slip(body, *y)[0]), (0, 1), (0.3, -6.0), events=stops, **options)
+        phi = reference.y[0]
+        _, N1, N2, D = np.transpose([self.slip(body, *state) for state in reference.y.T[::10]])
         assert min(D) < 0.0 < max(D)
-        assert (reactions > 0.0).all()
+        assert min(*N1, *N2) > 0.0
         for solver in ("auto", {"method": "event", "rtol": 1e-11}, {"method": "event", "rtol": 1e-14}):
             found = sweep(STEEP, {"initial.omega": [-6.0]}, solver=solver)
             assert ringsweep.words(found.regime) == ["resting"]
