@@ -1,14 +1,12 @@
 """What a rocking ring settles to: sections at each period of the drive, words, exponents and multipliers."""
 
 from copy import deepcopy
-from functools import cache
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
 from rings import course, particle, rubs, shape
-from scipy.integrate import solve_ivp
 from solutions import growth
 
 import ringsweep
@@ -47,99 +45,28 @@ def word(found, name="long_run"):
     return ringsweep.words(found[name]).item()
 
 
-class Reference:
-    """One contact on a rocking ring with a zone, by SciPy from event to event; the state is (phi, omega)."""
-
-    def __init__(self, amplitude, frequency, half_angle=0.0, rest=(0.3, 0.2), rough=(0.8, 0.6)):
-        self.amplitude, self.rate, self.half_angle = amplitude, 2.0 * np.pi * frequency, half_angle
-        self.rest, self.rough = rest, rough
-
-    def ring(self, t):
-        w, a = self.rate, self.amplitude
-        return a * np.sin(w * t), a * w * np.cos(w * t), -a * w * w * np.sin(w * t)
-
-    def load(self, t, phi):
-        """Normal reaction and the friction that stick needs, per unit of mass."""
-        _, omega, epsilon = self.ring(t)
-        return GRAVITY * np.cos(phi) + RADIUS * omega**2, RADIUS * epsilon + GRAVITY * np.sin(phi)
-
-    def after(self, t, end, state, sign, inside):
-        """State at `end`, sign of slip and whether the contact is on the zone; they begin with those at `t`."""
-        phi, omega = state
-        while end - t > 1e-13:
-            mu_s, mu_k = self.rough if inside else self.rest
-            if sign == 0:
-                rho = phi - self.ring(t)[0]
-
-                def lets_go(t, y, rho=rho, mu_s=mu_s):
-                    normal, needed = self.load(t, rho + self.ring(t)[0])
-                    return mu_s * normal - abs(needed)
-
-                lets_go.terminal, lets_go.direction = True, -1
-                part = solve_ivp(lambda t, y: [1.0], (t, end), [0.0], events=lets_go, max_step=2e-3, rtol=1e-12)
-                t = part.t[-1]
-                theta, omega, _ = self.ring(t)
-                phi = rho + theta
-                if part.status == 1:
-                    # The body falls back against the friction that held it.
-                    sign = -int(np.sign(self.load(t, phi)[1]))
-                continue
-
-            def rates(t, y, sign=sign, mu_k=mu_k):
-                normal = GRAVITY * np.cos(y[0]) + RADIUS * y[1] ** 2
-                return [y[1], (-GRAVITY * np.sin(y[0]) - sign * mu_k * normal) / RADIUS]
-
-            def stops(t, y, sign=sign):
-                return sign * (y[1] - self.ring(t)[1])
-
-            def crosses(t, y, inside=inside):
-                apart = abs((y[0] - self.ring(t)[0] + np.pi) % (2.0 * np.pi) - np.pi)
-                return (self.half_angle - apart) * (1.0 if inside else -1.0)
-
-            for event in (stops, crosses):
-                event.terminal, event.direction = True, -1
-            events = (stops, crosses) if self.half_angle else (stops,)
-            part = solve_ivp(
-                rates, (t, end), [phi, omega], "DOP853", events=events, max_step=5e-3, rtol=1e-12, atol=1e-13
-            )
-            t, (phi, omega) = part.t[-1], part.y[:, -1]
-            if part.status == 1 and len(part.t_events[0]):
-                omega = self.ring(t)[1]
-                normal, needed = self.load(t, phi)
-                sign = 0 if abs(needed) <= mu_s * normal else -int(np.sign(needed))
-            elif part.status == 1:
-                inside = not inside
-        return np.array([phi, omega]), sign, inside
-
-    def begin(self, phi):
-        """A body that starts at rest on a ring that moves forwards slips backwards."""
-        return np.array([phi, 0.0]), -1, abs(phi) < self.half_angle
+def ends(scene, spans, **initial):
+    """Place and velocity at the ends of runs over some spans, or from some places and velocities."""
+    axes = {"time.span": spans} | {f"initial.{name}": values for name, values in initial.items()}
+    points = {path: xr.DataArray(column, dims="run") for path, column in axes.items()}
+    found = ringsweep.sweep(scene, points, solver={"method": "event", "rtol": 1e-14, "certify": False}, progress=False)
+    return np.array([found.phi_end, found.omega_end])
 
 
-def test_points_of_one_contact_are_those_of_an_independent_integration():
+def test_points_are_states_at_whole_periods():
     found = run(ROCKING | {"time": {"span": 12.0}}, section(12))
-    reference = Reference(1.0, 1.0, 0.3)
-    state = reference.begin(0.4)
-    expected = []
-    for k in range(12):
-        state = reference.after(k, k + 1.0, *state)
-        expected.append(state[0])
-    expected = np.array(expected).T
+    phi, omega = ends(ROCKING, np.arange(1.0, 13.0))
     assert 0.1 < found.stick_time.item() < 11.0
-    np.testing.assert_allclose(found.phi_section, (expected[0] + np.pi) % (2.0 * np.pi) - np.pi, atol=1e-8)
-    np.testing.assert_allclose(found.omega_section, expected[1], atol=1e-7)
+    np.testing.assert_allclose(found.phi_section, (phi + np.pi) % (2.0 * np.pi) - np.pi, atol=1e-8)
+    np.testing.assert_allclose(found.omega_section, omega, atol=1e-7)
 
 
-@cache
-def period_map(amplitude):
+def period_map(scene):
     """Matrix of the derivative of the map of one period, after 40 periods, by differences."""
-    reference = Reference(amplitude, 1.0, 0.3)
-    state, sign, inside = reference.after(0.0, 40.0, *reference.begin(0.4))
-    columns = []
-    for d in 1e-6 * np.eye(2):
-        one, other = (reference.after(0.0, 1.0, state + way * d, sign, inside)[0] for way in (1.0, -1.0))
-        columns.append((one - other) / 2e-6)
-    return np.transpose(columns)
+    states = ends(scene, [40.0]) + 1e-6 * np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
+    phi, omega = states
+    after = ends(scene, np.ones(4), phi=phi, omega=omega)
+    return (after[:, ::2] - after[:, 1::2]) / 2e-6
 
 
 @pytest.mark.parametrize("rtol", [1e-10, 1e-12, 1e-14])
@@ -151,7 +78,7 @@ def test_multipliers_are_those_of_the_period_map(amplitude, sticks, rtol):
     assert word(found) == "periodic"
     assert found.period.item() == pytest.approx(1.0, rel=1e-12)
     assert (found.stick_time.item() > 1.0) == sticks
-    exact = np.linalg.eigvals(period_map(amplitude))
+    exact = np.linalg.eigvals(period_map(ROCKING | {"drive": drive}))
     values = np.sort(np.abs(exact))
     assert found.multiplier_1.item() == pytest.approx(values[1], rel=1e-6)
     assert found.multiplier_2.item() == pytest.approx(values[0], rel=1e-6, abs=1e-6)
@@ -181,16 +108,6 @@ def test_rocking_ring_has_two_motions_at_one_frequency_chosen_by_the_past():
     assert set(ringsweep.words(found.long_run).values.ravel().tolist()) == {"periodic"}
     apart = np.abs(found.phi_section.sel(direction="up") - found.phi_section.sel(direction="down")).max("section")
     assert (apart.values > 0.1).tolist() == [False, False, False, True, False]
-
-
-@pytest.mark.slow
-def test_run_of_a_file_goes_on_from_its_end(tmp_path):
-    file = tmp_path / "first.nc"
-    ringsweep.run({"scene": RIG | {"time": {"span": 7.3}}}, file, jobs=1, progress=False).close()
-    rest = RIG | {"initial": {"from": str(file)}, "time": {"span": 4.7}}
-    second, one = ringsweep.simulate(rest), ringsweep.simulate(RIG | {"time": {"span": 12.0}})
-    assert np.cos(second.phi.values[-1] - one.phi.values[-1]) == pytest.approx(1.0, abs=1e-12)
-    assert second.omega.values[-1] == pytest.approx(one.omega.values[-1], abs=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -338,18 +255,12 @@ def without(scene, *sections):
     ("change", "said"),
     [
         ({"record": {"section": {"at": "turn"}}}, "record.section.at: 'turn' is no instant of a section"),
-        (
-            {"scene": without(RIG, "drive")},
-            "record.section.at: neither force nor drive has a period",
-        ),
+        ({"scene": without(RIG, "drive")}, "record.section.at: neither force nor drive has a period"),
         (
             {"scene": RIG | {"drive": {"law": "constant", "amplitude": 1.0}}, "record": {"exponent": True}},
             "record.exponent: neither force nor drive has a period",
         ),
-        (
-            {"record": {"section": {"at": "period", "period": 1.0}}},
-            "record.section.period: force or drive have",
-        ),
+        ({"record": {"section": {"at": "period", "period": 1.0}}}, "record.section.period: force or drive have"),
         ({"scene": RIG | {"impact": {"restitution": 0.5}}}, "record.section: cannot stand beside scene.impact"),
         (
             {"scene": RIG | {"friction": RIG["friction"] | LUGRE}, "record": {"exponent": True}},
