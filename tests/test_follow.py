@@ -295,18 +295,3 @@ class TestFilesThatDoNotGoOn:
             file(one, scene=changed(LUGRE, "initial", **{"from": str(tmp_path / other)}))
         self.refused(tmp_path / "a.nc", "a result holds its initial values")
         assert cli.main(["run", str(tmp_path / "a.nc"), "--dry-run"]) == 2
-
-
-class TestSweepsInPython:
-    @pytest.mark.slow
-    def test_it_takes_record_and_follow_as_a_configuration_does(self, tmp_path):
-        scene, follow = changed(HARDENING, "time", span=40.0), {"axis": "force.frequency", "direction": "both"}
-        record, axes = {"section": {"at": "period", "keep": 4}}, {"force.frequency": FREQUENCIES[:3]}
-        python = ringsweep.sweep(scene, axes, tmp_path / "own.nc", record=record, follow=follow, progress=False)
-        yaml = run(scene, record=record, sweep={"grid": axes, "follow": follow})
-        assert python.sizes == yaml.sizes
-        for name in "x_end", "x_section", "started_from":
-            np.testing.assert_array_equal(python[name], yaml[name])
-        # The file holds what is needed to run it again.
-        again = ringsweep.run(tmp_path / "own.nc", progress=False)
-        np.testing.assert_array_equal(again["x_section"], yaml["x_section"])

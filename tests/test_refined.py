@@ -9,7 +9,6 @@ import yaml
 
 import ringsweep
 from benchmarks.hostile.attack import same_bits
-from benchmarks.hostile.kills import killed_at
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import AUDITED, INFERRED, LABELS
@@ -125,14 +124,6 @@ class TestFile:
 
 @pytest.mark.slow
 class TestContinuation:
-    @pytest.mark.parametrize("count", [2, 9])
-    def test_killed_sweep_continues_to_the_same_bits(self, config, refined, tmp_path, count):
-        arguments = ["run", str(config), "-o", str(tmp_path / "out.nc")]
-        point = "after a rename" if count == 2 else "merge"
-        assert killed_at(point, count, arguments).returncode == -9
-        assert cli.main(arguments) == 0
-        assert same_bits(tmp_path / "out.nc", refined)
-
     def test_stopped_sweep_computes_no_cell_twice(self, config, refined, tmp_path, monkeypatch, stored):
         monkeypatch.setattr(sweep, "_WRITE_INTERVAL", 0.0)
         put, calls = Checkpoint.put, iter(range(5))

@@ -95,28 +95,6 @@ def stopping(monkeypatch, owner, name, after):
         yield
 
 
-def test_interrupt_while_threads_start_loses_no_result_before(monkeypatch):
-    computed, started, start = threading.Event(), [], threading.Thread.start
-
-    def compute(task):
-        if task[0] == 1:
-            computed.set()
-        return int(task[0])
-
-    def interrupted(thread):
-        started.append(thread)
-        if len(started) == 2:
-            computed.wait(60.0)
-            raise KeyboardInterrupt
-        start(thread)
-
-    monkeypatch.setattr(threading.Thread, "start", interrupted)
-    found, tasks = [], (np.array([k]) for k in range(3))
-    with Execution(2).open() as workers, pytest.raises(KeyboardInterrupt):
-        found.extend(workers.results(compute, tasks, lambda result: result, threading.Event()))
-    assert found[:1] == [0]
-
-
 @pytest.fixture
 def half_done(config, tmp_path, monkeypatch, small_tasks):
     """Path of the result file of a sweep that was stopped after ten tasks."""
@@ -321,16 +299,6 @@ class TestCheckpoint:
             assert cli.main(["run", str(config), "-o", str(target)]) == 2
         assert "another ringsweep is computing it" in capsys.readouterr().err
         assert left(target) == []
-
-    def test_sweep_of_another_version_is_told_by_its_version_and_not_by_names(self, config, scene):
-        friction = dict(scene["friction"])
-        own = friction.pop("rest")
-        rest, elsewhere = (
-            identity(load({"scene": scene | {"friction": friction | {name: own}}})) for name in ("rest", "elsewhere")
-        )
-        assert rest == elsewhere
-        older = {name.replace("elsewhere", "rest"): text for name, text in elsewhere.items()} | {"ringsweep": "0.0.9"}
-        assert differences(older, elsewhere).startswith("ringsweep was 0.0.9, is ")
 
     def test_finished_sweep_is_neither_computed_again_nor_replaced_by_another(self, config, never_stopped, tmp_path):
         target = tmp_path / "out.nc"
