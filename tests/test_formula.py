@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 from rings import course, rubs, shape
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 from solutions import cell_of, made, motion
 
 import ringsweep
@@ -398,16 +397,6 @@ class TestNoFeatureIsMissed:
 
 
 class TestNegativeFriction:
-    DIP = Definition("mu_s - 1.5*mu_s*exp(-((v - vb)/w)**2)", "mu_s")
-
-    def test_narrow_interval_of_negative_friction_has_none(self):
-        w, vb = 1e-5, 0.31
-        law = made(define(self.DIP), vb=vb, w=w)
-        ends = vb - w * math.sqrt(math.log(1.5)), vb + w * math.sqrt(math.log(1.5))
-        assert law.thresholds[-3:-1] == pytest.approx(ends, rel=1e-11)
-        for v, valid in [(0.1, True), (ends[0] - 1e-9, True), (vb, False), (ends[1] - 1e-9, False), (1.0, True)]:
-            assert math.isnan(friction_at(law, v, (0.5, 0.3))[0]) != valid
-
     def test_interval_holds_for_the_surface_with_the_widest(self):
         cls = define(Definition("mu_k - mu_s*exp(-((v - vb)/w)**2)", "mu_s"))
         law = made(cls, [(0.5, 0.3), (0.5, 0.1)], vb=0.31, w=0.005)
@@ -453,22 +442,6 @@ class TestBand:
         assert stiction_band(made(define(Definition("mu_s*v/(w + v)")), w=0.01)) == pytest.approx(0.09, rel=1e-12)
         law = made(define(Definition("mu_s*tanh(v/w)")), w=0.01)
         assert stiction_band(law) == pytest.approx(0.01 * math.atanh(math.sqrt(0.99)), rel=1e-12)
-
-    def test_band_of_a_law_without_slope_at_rest_ends_beyond_its_steepest(self):
-        """The slope of v^2/(w^2 + v^2) is 2 v w^2/(w^2 + v^2)^2, which is greatest at w/sqrt(3)."""
-
-        def slope(x):
-            return x / (1.0 + x * x) ** 2
-
-        end = brentq(lambda x: slope(x) - 0.01 * slope(1.0 / math.sqrt(3.0)), 1.0, 100.0, xtol=1e-13)
-        law = made(define(Definition("mu_s*v**2/(v**2 + w**2)")), w=0.01)
-        assert stiction_band(law) == pytest.approx(0.01 * end, rel=1e-11)
-
-    @pytest.mark.slow
-    def test_word_does_not_depend_on_a_grid(self):
-        scene = belt(formula("mu_s*min(v/w, 1)", None, mu_s=0.4, w=0.1))
-        words = ringsweep.sweep(scene, {"friction.w": np.linspace(0.09, 0.12, 16)}, progress=False).regime
-        assert len(set(words.values)) == 1
 
 
 # ---- motion -----------------------------------------------------------------------------------
@@ -699,11 +672,6 @@ class TestTable:
         v = np.linspace(0.0, 0.5, 20001)
         off = np.abs(PchipInterpolator(SPEEDS, 0.4 / (1 + 3 * SPEEDS))(v) - 0.4 / (1 + 3 * v)).max()
         assert float(abs(found["x_max"] - known["x_max"])) < 20 * off
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("method", ["event", {"method": "rk4", "steps": 40000}])
-    def test_methods_agree_on_a_table(self, method):
-        assert distance(outcome(belt(table(), span=5.0), method), outcome(belt(table(), span=5.0)), ["x_end"]) < 1e-3
 
     def test_friction_is_monotone_between_the_data_and_constant_beyond(self):
         mu = np.array([0.5, 0.3, 0.29, 0.29, 0.4, 0.41])

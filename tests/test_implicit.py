@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from solutions import imbalance, solve, trail
+from solutions import solve, trail
 
 from ringsweep.quantities.flags import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.event import Event, Implicit
@@ -96,21 +96,6 @@ class TestLimit:
         exact = solve(LIMIT, setting(29, "tustin"))
         found = solve(Implicit(), setting(29))
         assert found.t_separation - exact.t_separation == pytest.approx(5.9e-5, rel=0.05)
-
-
-class TestEnergy:
-    """The energy of the body changes by the work of friction."""
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize(("alpha", "v0"), [(100.0, 0.2), (10.0, 1e-2), (100.0, 1e-3)])
-    def test_energy_changes_by_the_work_of_friction(self, setting, alpha, v0):
-        """The tolerance covers the quadrature of the work over a sampled history."""
-        batch = setting(30, friction__alpha=alpha, friction__v0=v0)
-        coarse, fine = (
-            imbalance(batch, trail(Implicit(rtol), batch, 1e-5), ((0.2, 0.1), (0.5, 0.3))) for rtol in (1e-4, 1e-8)
-        )
-        assert coarse < 1e-5
-        assert fine < 1e-8
 
 
 class TestCreep:

@@ -104,25 +104,11 @@ def script(page):
 
 
 @pytest.mark.slow
-def test_page_of_256_by_256_cells_is_smaller_than_6_megabytes(bokeh, tmp_path):
-    """Numbers vary smoothly, as between the boundaries of a map; bounds on errors vary by chance."""
-    ds, place = sweep(256, 256), np.linspace(0.0, 1.0, 256)
-    for k, name in enumerate(ds):
-        if ds[name].dtype == "float64":
-            ds[name][:] = np.sin(np.add.outer((3.0 + k) * place, 5.0 * place**2))
-    assert len(page_of(ds, tmp_path).encode()) < 6e6
-
-
-@pytest.mark.slow
-def test_page_loads_nothing_from_elsewhere_and_fits_a_telephone(bokeh, tmp_path):
+def test_page_loads_nothing_from_elsewhere(bokeh, tmp_path):
     page = page_of(sweep(4, 3), tmp_path)
     around = re.sub(r"(<script[^>]*>).*?</script>", r"\1", page, flags=re.S)
     assert not re.findall(r"\bsrc\b|\bhref\b|https?:", around)
     assert "<b>chance" not in page
-    assert re.search(r'<meta name="viewport" content="width=device-width', page.split("<body>")[0])
-    (tooltip,) = {one["tooltips"] for one in models(page, "HoverTool")}
-    assert "white-space: pre-wrap" in tooltip
-    assert int(re.search(r"max-width: (\d+)vw", tooltip)[1]) < 50
 
 
 def test_page_holds_numbers_with_four_digits_and_no_bound_is_rounded_down(bokeh, tmp_path):

@@ -110,15 +110,6 @@ class TestErrors:
         better["error_end"][found["method"].values == "rk4"] = falling
         assert "another motion" not in report(better)
 
-    def test_errors_of_separation_are_given_where_both_runs_separate(self, found, config):
-        reference = rerun(found, config, found.attrs["reference"])
-        separating = np.isfinite(reference["t_separation"].values)
-        assert separating.any()
-        assert not separating.all()
-        best = found.isel(contender=found["solver"].values == found.attrs["recommended"]).squeeze("contender")
-        np.testing.assert_array_equal(np.isfinite(best["error_separation"]), separating)
-        np.testing.assert_array_equal(np.isfinite(best["reference_error_separation"]), separating)
-
     def test_errors_equal_differences_of_reported_states(self, found, config):
         reference = rerun(found, config, found.attrs["reference"])
         for k in (0, 4):
