@@ -6,6 +6,7 @@ from math import atan2, copysign, cos, exp, floor, pi, sin, sqrt
 
 import numpy as np
 import pytest
+import xarray as xr
 from test_functions_of_time import belt, by, cells_of
 
 import ringsweep
@@ -68,12 +69,79 @@ def test_body_keeps_its_velocity_where_that_of_the_belt_jumps():
     assert run["mode"].values[run.time.values == 0.5].tolist() == [0, -1]
 
 
-def test_millionth_knot_is_as_exact_as_the_first():
-    force = {"formula": "A*sign(sin(w*t + p))", "A": 1.0, "w": 7.3, "p": 0.4}
+@pytest.mark.slow
+def test_pulses_move_a_body_as_the_closed_form_says():
+    rng = np.random.default_rng(6)
+    low, high = [1, 0, 1, 0.5, 0, 0.05, -0.5, -1], [20, 1, 5, 3, 1, 0.3, 0.5, 1]
+    k, c, A, T, d, static, x, v = rng.uniform(low, high, (12, 8)).T
+    span = 9.0
+    force = {"formula": "piecewise(t/T - floor(t/T) < d, A, 0)", "A": 1.0, "T": 1.0, "d": 0.5}
+    scene = belt(None, force, {"law": "stiction", "mu_s": 0.3, "mu_k": 0.2}) | {"damper": {"coefficient": 0.1}}
+    scene |= {"initial": {"x": 0.0, "velocity": 0.0}, "time": {"span": span}}
+    axes = {"force.A": A, "force.T": T, "force.d": d, "spring.stiffness": k, "damper.coefficient": c}
+    axes |= {"friction.mu_s": static, "friction.mu_k": 0.6 * static, "initial.x": x, "initial.velocity": v}
+    runs = ringsweep.sweep(scene, {path: xr.DataArray(values, dims="run") for path, values in axes.items()})
+    for i in range(12):
+        place, velocity = x[i], v[i]
+        turns = [(n + share) * T[i] for n in range(20) for share in (0.0, d[i])]
+        for t, end in pairwise([*(t for t in turns if t < span), span]):
+            F = A[i] if (0.5 * (t + end) / T[i]) % 1.0 < d[i] else 0.0
+            limits = {"static": static[i] * G, "kinetic": 0.6 * static[i] * G}
+            place, velocity = moved(place, velocity, F, end - t, k=k[i], c=c[i], **limits)
+        assert runs.certified[i] == 1
+        np.testing.assert_allclose([runs.x_end[i], runs.velocity_end[i]], [place, velocity], atol=1e-8)
+
+
+#: Functions with switches, and what they are between these; d is a number between 0 and 1.
+SWITCHING = {
+    "A*sign(sin(w*t + p) - d)": lambda t, A, w, p, d: A * np.sign(np.sin(w * t + p) - d),
+    "A*max(d, sin(w*t))": lambda t, A, w, d: A * np.maximum(d, np.sin(w * t)),
+    "A*max(-d, min(d, 2*sin(w*t)))": lambda t, A, w, d: A * np.clip(2.0 * np.sin(w * t), -d, d),
+    "piecewise(t/T - floor(t/T) < d, A, 0)": lambda t, A, T, d: A * (t / T % 1.0 < d),
+    "A*abs(abs(t/T - floor(t/T) - 0.5) - d/2)": lambda t, A, T, d: A * abs(abs(t / T % 1.0 - 0.5) - d / 2.0),
+    "A*sign(sin(w*t) + sin(3*w*t) - d)": lambda t, A, w, d: A * np.sign(np.sin(w * t) + np.sin(3.0 * w * t) - d),
+    "A*max(exp(-t/T), sin(w*t))": lambda t, A, w, T: A * np.maximum(np.exp(-t / T), np.sin(w * t)),
+    "A*sign(sin(w*t) + d*sin(sqrt(2)*w*t))": lambda t, A, w, d: (
+        A * np.sign(np.sin(w * t) + d * np.sin(np.sqrt(2.0) * w * t))
+    ),
+}
+
+
+@pytest.mark.parametrize("text", SWITCHING)
+def test_switches_at_any_expression_are_all_found(text):
+    rng = np.random.default_rng(8)
+    plain = SWITCHING[text]
+    for d in (0.0, 1e-9, *rng.uniform(size=3), 1.0):
+        known = {"A": 1.7, "w": rng.uniform(1.0, 9.0), "T": rng.uniform(0.3, 2.0), "p": rng.uniform(-9.0, 9.0), "d": d}
+        known = {name: known[name] for name in plain.__code__.co_varnames[1:]}
+        drive = take(cells_of(belt(None, {"formula": text, **known})), 0).drive.added
+        for t in rng.uniform(0.0, 6.0, 50):
+            drives.pass_knot(drive, Instant(t, 0.0))
+            assert drives.turn(drive, Instant(t, 0.0))[0] == pytest.approx(plain(t, **known), abs=1e-12)
+
+
+def test_an_expression_that_touches_zero_does_not_switch():
+    force = {"formula": "A*sign(sin(w*t) - d)", "A": 1.0, "w": 2.0, "d": 1.0}
     drive = take(cells_of(belt(None, force)), 0).drive.added
-    turns, share = drive.knots[0, 0, 0], drive.knots[0, 0, 1]
+    assert drives.knot_after(drive, Instant(0.0, 0.0)).t == np.inf
+
+
+@pytest.mark.parametrize(
+    ("formula", "share"),
+    [
+        ({"formula": "A*sign(sin(w*t + p))", "w": 7.3, "p": 0.4}, 0.5 - 0.4 / (2.0 * pi)),
+        ({"formula": "A*max(d, sin(w*t + p))", "w": 7.3, "p": 0.4, "d": 0.5}, 1.0 / 12.0 - 0.4 / (2.0 * pi)),
+        ({"formula": "piecewise(t/T - floor(t/T) < d, A, 0)", "T": 0.86, "d": 0.3}, 0.3),
+    ],
+)
+def test_billionth_knot_is_as_exact_as_the_first(formula, share):
+    drive = take(cells_of(belt(None, formula | {"A": 1.0})), 0).drive.added
+    turns, shares = drive.knots[-1, 0, 0], drive.knots[-1, 0, 1:]
+    found = shares[abs(shares - share).argmin()]
+    assert turns == (formula["w"] / (2.0 * pi) if "w" in formula else 1.0 / formula["T"])
+    assert found == pytest.approx(share, abs=1e-15)
     for n in (1, 10**6, 10**9):
-        exact = (n + Fraction(share)) / Fraction(turns)
+        exact = (n + Fraction(found)) / Fraction(turns)
         knot = drives.knot_after(drive, Instant(float(exact) - 1e-3, 0.0))
         assert abs(Fraction(knot.t) + Fraction(knot.rest) - exact) < Fraction(n, 10**29)
 
@@ -84,6 +152,9 @@ def test_millionth_knot_is_as_exact_as_the_first():
         ("A*sign(sin(w*t))", pi),
         ("A*max(0, sin(w*t)) + A*abs(cos(3*w*t))", pi),
         ("A*sin(2*pi*floor(w*t/pi)/4)", np.inf),
+        ("A*(t/T - floor(t/T))", 3.0),
+        ("A*piecewise(t - T*floor(t/T) < T/2, 1, sin(w*t))", np.inf),
+        ("A*max(sin(w*t) - sin(3*w*t), T/9)", pi),
         ("A*sign(t - T)", np.inf),
     ],
 )

@@ -184,6 +184,18 @@ def _extreme(choose: Any, a: Interval, b: Interval) -> Interval:
     return Interval(choose(a.low, b.low), choose(a.high, b.high), _either(a.partial, b.partial))
 
 
+def _wave(function: Any, peak: float, a: Interval) -> Interval:
+    """Sine or cosine, which is greatest at a share `peak` of a turn."""
+    turns = [end / (2.0 * np.pi) - peak for end in (a.low, a.high)]
+    slack = 4.0 * _LIBRARY * (1.0 + np.maximum(*map(abs, turns)))
+    # An interval with no bound reaches all.
+    tops, bottoms = (~(np.floor(turns[1] - shift + slack) < np.ceil(turns[0] - shift - slack)) for shift in (0.0, 0.5))
+    ends = function(a.low), function(a.high)
+    low, high, partial = _outward(np.minimum(*ends), np.maximum(*ends), a.partial)
+    low, high = low - _LIBRARY * abs(low), high + _LIBRARY * abs(high)
+    return Interval(np.where(bottoms, -1.0, np.maximum(low, -1.0)), np.where(tops, 1.0, np.minimum(high, 1.0)), partial)
+
+
 def _decay(a: Interval) -> Interval:
     """``1 - tanh(x)**2``, without cancellation."""
     sizes = abs(a.low), abs(a.high)
@@ -210,6 +222,9 @@ _VALUES: dict[str, Callable[..., Interval]] = {
     "atan": _monotone(np.arctan),
     "sqrt": _sqrt,
     "log": _log,
+    "log1p": lambda a: _log(add(a, exact(1.0))),
+    "sin": partial(_wave, np.sin, 0.25),
+    "cos": partial(_wave, np.cos, 0.0),
     "minimum": partial(_extreme, np.minimum),
     "maximum": partial(_extreme, np.maximum),
 }
@@ -288,7 +303,7 @@ class Enclosure:
     values : mapping of str to ndarray of shape ``(rows,)``
         Values of the parameters.
     thresholds : sequence of ndarray of shape ``(rows,)``
-        Speed of each threshold.
+        Speed of each threshold, or the held number.
     """
 
     def __init__(
@@ -339,6 +354,8 @@ class Enclosure:
                     found[node] = _taken(self._constant(node), row)
                 elif node.kind == "variable":
                     found[node] = Interval(low, high)
+                elif node.kind == "held":
+                    found[node] = exact(self.thresholds[node.value][row])
                 elif node.kind == "switch":
                     found[node] = _chosen(side < self.thresholds[node.value][row], *parts)
                 else:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.numerics.expressions import evaluate
 from ringsweep.numerics.intervals import VANISHING, Enclosure, Interval, add, exact, multiply
 
 #: Speeds, m/s: less is rest, and nothing is faster than the second, which is three times the speed of light.
@@ -274,6 +275,21 @@ def sign_changes(enclosure: Enclosure, cells: Cells, least: float | None = None)
     first[row[::-1]] = sign[::-1]
     change = np.flatnonzero((row[1:] == row[:-1]) & (sign[1:] != sign[:-1]))
     return Changes(first, row[change], high[change], low[change + 1], sign[change + 1])
+
+
+def refined(changes: Changes, enclosure: Enclosure, least: float = 0.0) -> NDArray[np.float64]:
+    """First speed beyond each change of sign, m/s; `least` as for :func:`sign_changes`."""
+    values = {name: column[changes.row] for name, column in enclosure.values.items()}
+    thresholds = [threshold[changes.row] for threshold in enclosure.thresholds]
+    low, high = changes.low, changes.high
+    while True:
+        middle = 0.5 * (low + high)
+        if not ((low < middle) & (middle < high)).any():
+            return high
+        value = evaluate(enclosure.output, middle, values, thresholds) - least
+        # A number that is none is not the one before a pole.
+        passed = np.where(changes.after > 0, value >= 0.0, ~(value > 0.0) if least == 0.0 else ~(value >= 0.0))
+        low, high = np.where(passed, low, middle), np.where(passed, middle, high)
 
 
 def _signs(enclosure: Enclosure, cells: Cells, least: float | None) -> NDArray[np.int8]:

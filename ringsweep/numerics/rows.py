@@ -32,3 +32,8 @@ def distinct_rows(columns: Iterable[NDArray[Any]]) -> tuple[NDArray[np.intp], ND
     place = np.empty_like(order)
     place[order] = np.cumsum(begins) - 1
     return order[begins], place
+
+
+def places_of(row: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Place of each row number among those that are equal to it; they ascend."""
+    return np.arange(len(row)) - np.searchsorted(row, row)

@@ -344,26 +344,34 @@ def least_jump(drive):
 
 
 @inlined
-def _piece_at(knots, now):
-    """Held number of a threshold at and after an instant, and the instant of its next knot.
+def _knot(knots, n):
+    """Instant of a knot; `knots` are those of a threshold, counted from the first one of the turn that begins at 0.
 
-    `knots` are those of the threshold, see :func:`ringsweep.physics.functions_of_time.knots_of`.
+    See :func:`ringsweep.physics.functions_of_time.table_of_knots`.
     """
-    frequency, held = knots[0, 0], nan
-    # The turn before may be the present one but for rounding.
-    turn = floor(frequency * now.t) - 2.0
-    while True:
-        for j in range(1, knots.shape[1]):
-            share = knots[0, j]
-            if share == inf:
-                break
-            knot = clock.turned(frequency, turn, share) if frequency > 0.0 else clock.Instant(share, 0.0)
-            if clock.is_after(knot, now):
-                return held, knot
-            held = knots[1, j] + (knots[1, 0] * turn if frequency > 0.0 else 0.0)
-        if frequency == 0.0:
-            return held, clock.Instant(inf, 0.0)
-        turn += 1.0
+    frequency, count = knots[0, 0], knots.shape[1] - 1
+    turn = n // count
+    if frequency > 0.0:
+        return clock.turned(frequency, float(turn), knots[0, 1 + n - turn * count])
+    return clock.Instant(knots[0, 1 + n] if n < count else inf, 0.0)
+
+
+@inlined
+def _last_knot(knots, now):
+    """Number of the last :func:`_knot` that is not after an instant."""
+    count = knots.shape[1] - 1
+    low, high = 0, count
+    if knots[0, 0] > 0.0:
+        # But for rounding this turn may be the one before or after.
+        turn = floor(knots[0, 0] * now.t)
+        low, high = (turn - 2) * count, (turn + 2) * count
+    while high - low > 1:
+        middle = (low + high) // 2
+        if clock.is_after(_knot(knots, middle), now):
+            high = middle
+        else:
+            low = middle
+    return low
 
 
 @inlined
@@ -371,7 +379,7 @@ def _next_of(knots, now):
     """Instant of the next knot of all thresholds."""
     found = clock.Instant(inf, 0.0)
     for i in range(len(knots)):
-        _, knot = _piece_at(knots[i], now)
+        knot = _knot(knots[i], _last_knot(knots[i], now) + 1)
         if clock.is_after(found, knot):
             found = knot
     return found
@@ -382,8 +390,9 @@ def _hold(held, knots, now):
     """Fill the numbers that are held from an instant on, and return whether any of them changes."""
     changed = False
     for i in range(len(held)):
-        before = held[i]
-        held[i], _ = _piece_at(knots[i], now)
+        before, count = held[i], knots.shape[2] - 1
+        n = _last_knot(knots[i], now)
+        held[i] = knots[i, 1, 1 + n % count] + knots[i, 1, 0] * (n // count)
         changed = changed or held[i] != before
     return changed
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,14 @@ from ringsweep.numerics.expressions import (
     multiply,
     negative,
     nodes_of,
+    number,
+    substitute,
+    symbol,
+    symbols_of,
 )
+from ringsweep.numerics.intervals import Enclosure
+from ringsweep.numerics.isolation import UndecidedError, cells_between, refined, sign_changes
+from ringsweep.numerics.rows import distinct_rows, places_of
 from ringsweep.physics.friction.formula import FormulaError, Language, Reader, Threshold, Units, parsed, unit_of
 
 #: The language of drives and forces.
@@ -179,39 +186,67 @@ def read_rate(text: Any, unit: str) -> Function:
 # ---- knots ------------------------------------------------------------------------------------
 
 
-class _Knots(NamedTuple):
-    """Knots of a threshold: `shares` of a turn at a frequency, Hz, or times, s, if the frequency is 0.
+def table_of_knots(frequency: Any, gain: Any, shares: Any, after: Any) -> NDArray[np.float64]:
+    """Knots of a threshold, of shape ``(cells, 2, knots + 1)``: frequency and shares, gain and held numbers.
 
-    From a knot on the held number is that in `after`, and in each turn greater by `gain`. Of a switch it is infinite on
-    the lower side, and minus infinite on the upper one. `shares` and `after` have the shape ``(cells, knots)``.
+    Knots are `shares` of a turn at a frequency, Hz; or times, s, the first one not after 0, if the frequency is 0. From
+    a knot on the held number is that in `after`, and in each turn greater by `gain`. Of a switch it is infinite on the
+    lower side, and minus infinite on the upper one. `shares` and `after` have the shape ``(cells, knots)``.
     """
-
-    frequency: Any
-    gain: Any
-    shares: Any
-    after: Any
+    order = np.argsort(shares, axis=1, kind="stable")
+    rows = [
+        np.column_stack([number, np.take_along_axis(several, order, axis=1)])
+        for number, several in ((frequency, shares), (gain, after))
+    ]
+    return np.stack(rows, axis=1)
 
 
 def knots_of(function: Function, values: Values, spans: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Knots of a function, of shape ``(cells, thresholds, 2, knots + 1)``.
-
-    The first row of a threshold holds frequency and shares of :class:`_Knots`, the second one gain and held numbers.
+    """Knots of a function, of shape ``(cells, thresholds, 2, knots + 1)``; see :func:`table_of_knots`.
 
     Raises
     ------
     FormulaError
         If the knots of a threshold cannot be located.
     """
-    found: list[_Knots] = [_knots_of_threshold(knot, values) for knot in function.knots]
-    most = max((one.shares.shape[1] for one in found), default=0)
-    table = np.full((len(spans), len(found), 2, most + 1), inf)
-    for i, one in enumerate(found):
-        table[:, i, 0, 0], table[:, i, 1, 0] = one.frequency, one.gain
-        count = one.shares.shape[1]
-        order = np.argsort(one.shares, axis=1, kind="stable")
-        table[:, i, 0, 1 : count + 1] = np.take_along_axis(one.shares, order, axis=1)
-        table[:, i, 1, 1 : count + 1] = np.take_along_axis(one.after, order, axis=1)
-    return table
+    differences = [knot.difference for knot in function.knots if knot.difference is not None]
+    names = symbols_of(*differences)
+    some, rows = distinct_rows([*(values[name] for name in names), spans])
+    known = {name: values[name][some] for name in names}
+    knots = np.empty((len(some), 0, 2, 2))
+    for knot, difference in zip(function.knots, differences, strict=True):
+        find = _of_floor if knot.kind == "floor" else _of_switch
+        found = find(difference, known | {"knots": knots}, spans[some])[:, None]
+        most = max(knots.shape[-1], found.shape[-1])
+        # A knot that is there twice is one.
+        knots = np.concatenate([_widened(table, most) for table in (knots, found)], axis=1)
+    return knots[rows]
+
+
+def _widened(knots: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+    """Knots of which the last one is repeated."""
+    return np.pad(knots, [*[(0, 0)] * (knots.ndim - 1), (0, width - knots.shape[-1])], mode="edge")
+
+
+def _line(difference: Node, values: Values) -> tuple[Any, Any] | None:
+    """Value at t = 0 and slope of a straight line in t; None of another expression."""
+    rate = derivative(difference)
+    if rate.varies or any(node.kind in ("switch", "held") for node in nodes_of(difference)):
+        return None
+    cells = len(values["knots"])
+    start, slope = (np.broadcast_to(evaluate(node, 0.0, values), cells) for node in (difference, rate))
+    return start, slope
+
+
+def _of_floor(inner: Node, values: Values, spans: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Knots of a whole part."""
+    if (line := _line(inner, values)) is None:
+        raise FormulaError("floor takes a straight line in t, such as floor(t/T)")
+    start, slope = line
+    # The line passes a whole number once in each turn.
+    first = np.where(slope > 0.0, np.ceil(start), np.floor(start) - (slope < 0.0))
+    shares = np.where(slope == 0.0, -inf, np.where(slope > 0.0, -start, start) % 1.0 % 1.0)
+    return table_of_knots(abs(slope), np.sign(slope), shares[:, None], first[:, None])
 
 
 def _side(is_above: Any) -> Any:
@@ -219,43 +254,102 @@ def _side(is_above: Any) -> Any:
     return np.where(is_above, -inf, inf)
 
 
-def _knots_of_threshold(knot: Threshold, values: Values) -> _Knots:
-    """Knots of one threshold."""
-    difference = knot.difference
-    assert difference is not None
-    factor, wave = difference.parts if difference.kind == "multiply" else (ONE, difference)
-    rate: Node = derivative(difference)
-    start: Any
-    if wave.kind in ("sin", "cos") and not factor.varies and (turning := frequency(wave.parts[0])) is not None:
-        turns, shift, start = (evaluate(node, 0.0, values) for node in turning)
-        start = turns * shift + start / (2.0 * np.pi) + (0.25 if wave.kind == "cos" else 0.0)
-        # A sine that turns backwards is the negative of one that turns forwards.
-        size = evaluate(factor, 0.0, values) * np.where(turns < 0.0, -1.0, 1.0)
-        turns, start, size = np.broadcast_arrays(abs(turns), np.where(turns < 0.0, -start, start), np.atleast_1d(size))
-        turning_now = (turns > 0.0) & (size != 0.0)
-        rises = np.where(turning_now, -start % 1.0 % 1.0, -inf)
-        falls = np.where(turning_now, (0.5 - start) % 1.0 % 1.0, inf)
-        first = np.where(turning_now, size > 0.0, size * np.sin(2.0 * np.pi * start) >= 0.0)
-        zero = np.zeros_like(turns)
-        sides = np.stack([_side(first), _side(~first)], axis=-1)
-        return _Knots(np.where(turning_now, turns, 0.0), zero, np.stack([rises, falls], axis=-1), sides)
-    if rate.varies or any(node.kind in ("switch", "held") for node in nodes_of(difference)):
+def _of_switch(difference: Node, values: Values, spans: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Knots of a switch, which are where a difference changes its sign."""
+    zero = np.zeros(len(spans))
+    if (line := _line(difference, values)) is not None:
+        start, slope = line
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.where(slope == 0.0, inf, -start / slope)
+        before = np.where(slope == 0.0, start >= 0.0, slope < 0.0)
+        times = np.stack([np.full_like(root, -inf), root], axis=-1)
+        return table_of_knots(zero, zero, times, np.stack([_side(before), _side(~before)], axis=-1))
+    turns = _frequency_of(difference, values, spans)
+    with np.errstate(divide="ignore"):
+        cell, times, signs = _signs_of(difference, values, np.where(turns > 0.0, 1.0 / turns, spans))
+    begins = places_of(cell) == 0
+    # In a periodic function the first sign comes after the last one.
+    before = np.roll(signs, 1)
+    before[begins] = signs[np.append(begins[1:], True)]
+    turns = np.where(np.bincount(cell, signs != before) > 0.0, turns, 0.0)
+    begins &= turns[cell] == 0.0
+    shares = np.where(begins, -inf, np.where(turns[cell] > 0.0, times * turns[cell] % 1.0 % 1.0, times))
+    chosen = (signs != before) | begins
+    cell, shares, after = cell[chosen], shares[chosen], _side(signs[chosen] > 0)
+    place = places_of(cell)
+    last = np.append(cell[1:] != cell[:-1], True)
+    table = [np.repeat(column[last][:, None], place.max() + 1, axis=1) for column in (shares, after)]
+    for column, found in zip(table, (shares, after), strict=True):
+        column[cell, place] = found
+    return table_of_knots(turns, zero, *table)
+
+
+def _frequency_of(difference: Node, values: Values, spans: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Frequency of an expression, Hz, that is exactly that of its parts; 0 if it does not repeat."""
+    period = np.broadcast_to(period_of(difference, values), spans.shape)
+    repeats = (period > 0.0) & (period < inf)
+    found, least = np.zeros(len(spans)), np.full(len(spans), inf)
+    for node in nodes_of(difference):
+        turns = np.broadcast_to(_turns_of(node, values), spans.shape)
+        with np.errstate(invalid="ignore"):
+            count = np.round(turns * period)
+            # Else the parts would part from each other.
+            repeats &= (turns == 0.0) | (abs(turns * period - count) <= 1e-14 * count)
+        better = repeats & (turns > 0.0) & (count < least)
+        found, least = np.where(better, turns / np.where(better, count, 1.0), found), np.where(better, count, least)
+    return np.where(repeats, found, 0.0)
+
+
+# A period or a span is looked at in so many pieces at least.
+_PIECES = 16
+
+# Beginning and length of such a piece, s. No parameter has a space in its name.
+_BEGIN, _LENGTH = symbol("begin of piece"), symbol("length of piece")
+
+
+def _signs_of(difference: Node, values: Values, lengths: NDArray[np.float64]) -> tuple[Any, Any, Any]:
+    """Signs of an expression from the time 0 to `lengths`, s: cell, time, s, and the sign from there on, in order."""
+    knots, cells = values["knots"], len(lengths)
+    marks = [np.linspace(0.0, 1.0, _PIECES + 1) * lengths[:, None]]
+    for node in nodes_of(difference):
+        if node.kind in ("switch", "held"):
+            one = knots[:, node.value]
+            times = times_of(one, 1 + int(np.max(one[:, 0, 0] * lengths)))
+            marks.append(np.clip(times.reshape(-1, cells).T, 0.0, lengths[:, None]))
+    ends = np.sort(np.concatenate(marks, axis=1), axis=1)
+    # Marks that differ by rounding are one.
+    cell, place = np.nonzero(np.diff(ends) > 1e-14 * lengths[:, None])
+    begin, length = ends[cell, place], np.diff(ends)[cell, place]
+    held = held_at(knots[cell], begin + 0.5 * length)
+    parameters = {name: np.broadcast_to(values[name], cells)[cell] for name in symbols_of(difference)}
+    # From 1 to 2 all numbers have the same rounding.
+    moved = substitute(difference, {TIME: add(_BEGIN, multiply(_LENGTH, add(TIME, number(-1.0))))})
+    enclosure = Enclosure(moved, parameters | {_BEGIN.value: begin, _LENGTH.value: length}, held)
+    one = np.ones(len(cell))
+    try:
+        changes = sign_changes(enclosure, cells_between(one, 2.0 * one, []))
+    except UndecidedError:
         raise FormulaError(
-            "the times of its switches are not found: min, max, abs, sign, floor and conditions take straight lines in "
-            "t, or compare a sine or cosine of one with 0"
-        )
-    start, slope = np.broadcast_arrays(*(np.atleast_1d(evaluate(node, 0.0, values)) for node in (difference, rate)))
-    zero = np.zeros_like(start)
-    if knot.kind == "floor":
-        # The line passes a whole number once in each turn.
-        first = np.where(slope > 0.0, np.ceil(start), np.floor(start) - (slope < 0.0))
-        shares = np.where(slope == 0.0, -inf, np.where(slope > 0.0, -start, start) % 1.0 % 1.0)
-        return _Knots(abs(slope), np.sign(slope), shares[:, None], first[:, None])
+            "the times of its switches are not found: within the span the two sides of a condition, or what is in min, "
+            "max, abs or sign, cross too often, or are equal to rounding for a while"
+        ) from None
+    row = changes.row
+    times = np.append(begin, begin[row] + length[row] * (refined(changes, enclosure) - 1.0))
+    cell, signs = np.append(cell, cell[row]), np.append(changes.first, changes.after)
+    # Zero everywhere is no negative number.
+    zero = np.setdiff1d(np.arange(cells), cell[signs != 0])
+    cell, times, signs = (np.append(a, b) for a, b in ((cell, zero), (times, 0.0 * zero), (signs, 1 + 0 * zero)))
+    cell, times, signs = (column[signs != 0] for column in (cell, times, signs))
+    order = np.lexsort((times, cell))
+    return cell[order], times[order], signs[order]
+
+
+def times_of(knots: NDArray[np.float64], turns: int) -> NDArray[np.float64]:
+    """Times of the knots of a threshold in its first turns, s, of shape ``(turns, knots, cells)``."""
+    frequency, shares = knots[:, 0, 0], knots[:, 0, 1:].T
+    count = np.arange(turns)[:, None, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.where(slope == 0.0, inf, -start / slope)
-    before = np.where(slope == 0.0, start >= 0.0, slope < 0.0)
-    times = np.stack([np.full_like(root, -inf), root], axis=-1)
-    return _Knots(zero, zero, times, np.stack([_side(before), _side(~before)], axis=-1))
+        return np.where(frequency > 0.0, (count + shares) / frequency, shares)
 
 
 def held_at(knots: NDArray[np.float64], times: Any) -> list[NDArray[np.float64]]:
@@ -265,10 +359,9 @@ def held_at(knots: NDArray[np.float64], times: Any) -> list[NDArray[np.float64]]
         (turns, shares), (gain, after) = ((row[:, 0], row[:, 1:]) for row in (knots[:, i, 0], knots[:, i, 1]))
         turn = np.floor(turns * times)
         at = np.where(turns > 0.0, turns * times - turn, times)
+        # Before the first knot of a turn, the last one of the turn before holds.
         last = (shares <= at[..., None]).sum(axis=-1) - 1
-        before = last < 0
-        last = np.where(before, (shares < inf).sum(axis=-1) - 1, last)
-        found.append(after[np.arange(len(knots)), last] + gain * (turn - before))
+        found.append(after[np.arange(len(knots)), last] + gain * (turn - (last < 0)))
     return found
 
 
@@ -318,12 +411,10 @@ def check(
             at = times[~np.isfinite(sampled)][0]
             what = ("the formula", "its first derivative", "its second derivative", "its third derivative")[order]
             raise FormulaError(f"{what} is no finite number at t = {at:.6g} s")
-    turns = np.arange(_TURNS)[:, None, None]
-    for i in range(knots.shape[1]):
-        frequency, shares = knots[:, i, 0, :1], knots[:, i, 0, 1:]
+    for i in range(knots.shape[1] if continuous else 0):
+        t = times_of(knots[:, i], _TURNS)
         with np.errstate(divide="ignore"):
-            t = np.moveaxis(np.where(frequency > 0.0, (turns + shares) / frequency, shares), -1, 1)
-            near = 1e-9 * np.where(frequency[:, 0] > 0.0, 1.0 / frequency[:, 0], spans)
+            near = 1e-9 * np.where(knots[:, i, 0, 0] > 0.0, 1.0 / knots[:, i, 0, 0], spans)
         within = (t > 0.0) & (t <= spans)
         t = np.where(within, t, 0.0)
         sides = [held_at(knots, t + side) for side in (-near, near)]
@@ -349,31 +440,47 @@ def extremes(node: Node, values: Values, knots: NDArray[np.float64], spans: NDAr
 # ---- periods ----------------------------------------------------------------------------------
 
 
+def _turns_of(node: Node, values: Values) -> Any:
+    """Frequency of a sine or cosine of a straight line in t, or of a switch or whole part, Hz; 0 of another node."""
+    if node.kind in ("switch", "held"):
+        return values["knots"][..., node.value, 0, 0]
+    turning = frequency(node.parts[0]) if node.kind in ("sin", "cos") else None
+    return np.zeros(()) if turning is None else abs(evaluate(turning[0], 0.0, values))
+
+
 def period_of(node: Node, values: Values) -> Any:
     """Period of an expression, s; 0 for a constant, infinite if it does not repeat.
 
-    It repeats if the time stands only in sines and cosines of straight lines in t, and in switches and whole parts of
-    them, whose periods have a common multiple.
+    It repeats if the time stands only in sines and cosines of straight lines in t, in switches and whole parts of
+    them, whose periods have a common multiple, and in straight lines that together do not grow.
     """
     found: dict[Node, Any] = {}
-    knots: Any = values.get("knots")
+    # How fast an expression grows, 1/s, beside what repeats.
+    growths: dict[Node, Any] = {}
     for one in nodes_of(node):
-        if one.kind in ("sin", "cos") and (turning := frequency(one.parts[0])) is not None:
-            turns = abs(evaluate(turning[0], 0.0, values))
-            with np.errstate(divide="ignore"):
-                found[one] = np.where(turns > 0.0, 1.0 / turns, 0.0)
-            continue
-        found[one] = inf if one.kind == "variable" else 0.0
+        turns, parts = _turns_of(one, values), one.parts
+        with np.errstate(divide="ignore"):
+            period = np.where(turns > 0.0, 1.0 / turns, 0.0)
+        growth: Any = 1.0 if one.kind == "variable" else 0.0
         if one.kind in ("switch", "held"):
-            turns, shares, gain = (knots[..., one.value, i, k] for i, k in ((0, 0), (0, slice(1, None)), (1, 0)))
+            shares, gain = (values["knots"][..., one.value, i, k] for i, k in ((0, slice(1, None)), (1, 0)))
             once = ((shares > 0.0) & (shares < inf)).any(axis=-1)
-            with np.errstate(divide="ignore"):
-                found[one] = np.where(gain != 0.0, inf, np.where(turns > 0.0, 1.0 / turns, np.where(once, inf, 0.0)))
-        for part in one.parts:
-            found[one] = common_period(found[one], found[part])
-        if one.kind == "multiply" and not one.parts[0].varies:
-            found[one] = np.where(evaluate(one.parts[0], 0.0, values) == 0.0, 0.0, found[one])
-    return found[node]
+            period, growth = np.where((turns == 0.0) & once, inf, period), gain * turns
+        is_wave = one.kind in ("sin", "cos") and frequency(parts[0]) is not None
+        for part in () if is_wave else parts:
+            period = common_period(period, found[part])
+        if one.kind == "add":
+            growth = sum(growths[part] for part in parts)
+            terms = sum(abs(growths[part]) for part in parts)
+            growth = np.where(abs(growth) <= 1e-14 * terms, 0.0, growth)
+        elif one.kind == "multiply" and not parts[0].varies:
+            factor = evaluate(parts[0], 0.0, values)
+            period, growth = np.where(factor == 0.0, 0.0, period), factor * growths[parts[1]]
+        elif not is_wave:
+            for part in parts:
+                period = np.where(growths[part] == 0.0, period, inf)
+        found[one], growths[one] = period, growth
+    return np.where(growths[node] == 0.0, found[node], inf)
 
 
 # Largest number of periods, of the slower of two oscillations, that make a common period.

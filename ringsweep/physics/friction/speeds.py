@@ -20,16 +20,16 @@ from ringsweep.numerics.intervals import Enclosure
 from ringsweep.numerics.isolation import (
     FASTEST,
     Cells,
-    Changes,
     UndecidedError,
     cells_between,
     first_flat,
     not_negligible,
     reach,
+    refined,
     sign_changes,
     steepest,
 )
-from ringsweep.numerics.rows import distinct_rows
+from ringsweep.numerics.rows import distinct_rows, places_of
 from ringsweep.physics.friction.formula import FormulaError, Threshold
 from ringsweep.physics.friction.velocity import Expression
 
@@ -292,12 +292,13 @@ class _Finder:
         self, difference: Node, low: NDArray[np.float64], high: NDArray[np.float64]
     ) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
         """Sign of a difference at first, and the speeds at which it changes, of shape ``(rows, 3)``."""
-        changes = sign_changes(self._enclosed(difference), self._cells(low, high))
+        enclosure = self._enclosed(difference)
+        changes = sign_changes(enclosure, self._cells(low, high))
         count = np.bincount(changes.row, minlength=self.rows)
         if (count + (changes.first > 0) > 3).any():
             raise FormulaError("min, max or abs switch more than three times: write piecewise")
         found = np.full((self.rows, 3), np.inf)
-        found[changes.row, _places(changes.row)] = self._refined(difference, changes)
+        found[changes.row, places_of(changes.row)] = refined(changes, enclosure)
         return changes.first, found
 
     @staticmethod
@@ -305,20 +306,6 @@ class _Finder:
         """Speed at which a difference changes its sign; order 0 is 0 if it is positive at first."""
         wanted = order - (first > 0)
         return np.where(wanted < 0, 0.0, np.take_along_axis(speeds, wanted.clip(0)[:, None], axis=1)[:, 0])
-
-    def _refined(self, node: Node, changes: Changes, least: float = 0.0) -> NDArray[np.float64]:
-        """First speed of each change of sign at which the sign is no longer the one before."""
-        values = {name: column[changes.row] for name, column in self.values.items()}
-        thresholds = [threshold[changes.row] for threshold in self.thresholds]
-        low, high = changes.low, changes.high
-        while True:
-            middle = 0.5 * (low + high)
-            if not ((low < middle) & (middle < high)).any():
-                return high
-            value = evaluate(node, middle, values, thresholds) - least
-            # A number that is none is not the one before a pole.
-            passed = np.where(changes.after > 0, value >= 0.0, ~(value > 0.0) if least == 0.0 else ~(value >= 0.0))
-            low, high = np.where(passed, low, middle), np.where(passed, middle, high)
 
     def _kept(
         self, threshold: Threshold, low: NDArray[np.float64], high: NDArray[np.float64]
@@ -350,8 +337,9 @@ class _Finder:
             raise FormulaError(
                 f"at rest it gives {at_rest[wrong][0]:.6g}: a friction coefficient is a number and not negative"
             )
-        changes = sign_changes(self._enclosed(mu), self._cells(self.rest, np.full(self.rows, np.inf)), -_ROUNDING)
-        speeds = self._refined(mu, changes, -_ROUNDING)
+        enclosure = self._enclosed(mu)
+        changes = sign_changes(enclosure, self._cells(self.rest, np.full(self.rows, np.inf)), -_ROUNDING)
+        speeds = refined(changes, enclosure, -_ROUNDING)
         sets = self.rows // self.surfaces
         found = np.full((3, sets), np.inf)
         for own in np.unique(changes.row % sets):
@@ -441,11 +429,6 @@ class _Finder:
         beyond_band = self._cells(np.tile(band, self.surfaces), np.full(self.rows, np.inf))
         beyond = steepest(self._enclosed(self.expression.mu), beyond_band)
         return self._by_surface(at_rest).max(axis=0), self._by_surface(beyond).max(axis=0)
-
-
-def _places(row: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Place of each row number among those that are equal to it; they ascend."""
-    return np.arange(len(row)) - np.searchsorted(row, row)
 
 
 def _sorted_edges(edges: list[NDArray[np.float64]]) -> NDArray[np.float64]:
