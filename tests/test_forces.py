@@ -17,7 +17,7 @@ from ringsweep.compile import Cells, kernel, map_leaves, take
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import batch
-from ringsweep.models.belt.series import Mode
+from ringsweep.models.belt.mode import Mode
 from ringsweep.models.interface import audit, implicit, series
 from ringsweep.numerics.terms import COLUMNS
 from ringsweep.physics import belt, drives, ring

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 from ringsweep.compile import absorbed, feature, inlined
 from ringsweep.numerics.functions import floor, negated, select
 from ringsweep.numerics.memory import select_all
-from ringsweep.physics.belt import Belt, BristleBelt, StopBelt
+from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.ring import BristleRing, Ring
 from ringsweep.quantities.flags import CHAOTIC, QUASI_PERIODIC, TRANSIENT
 
@@ -222,7 +222,7 @@ def difference(scene, x, other):
     return apart - 2.0 * pi * floor(apart / (2.0 * pi) + 0.5)
 
 
-@feature("1.0", of=(Belt, BristleBelt, StopBelt), absorb=True)
+@feature("1.0", of=(Belt, BristleBelt), absorb=True)
 def place_counts(scene):
     """1 if states at different places differ; 0 if the same motion is possible everywhere."""
     return scene.place_counts

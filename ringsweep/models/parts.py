@@ -150,7 +150,8 @@ def drive_of(structure: Structure, values: Values) -> Any:
     """
     if structure.table is None:
         # Neither bristles nor impacts take a jump of the sliding velocity.
-        smooth = structure.impact or friction.family_of(structure.law_type) is friction.Dynamic
+        rebounds = structure.impact and structure.model != "belt"
+        smooth = rebounds or friction.family_of(structure.law_type) is friction.Dynamic
         return by_formula(structure.drive_type, "drive", structure.drive_key, values, smooth=smooth)
     columns = {field: values[f"drive.{field}"] for field in declared(structure.drive_type)}
     return table_of(*structure.table, columns["amplitude"], "drive", values)

@@ -166,8 +166,9 @@ def audited(scene, mode, forcing, y):
     """
 
 
-@audit.violation.implements(BristleRing, BristleBelt)
-def _violation_on_bristles(scene, mode, forcing, y, rates, s, tolerance):
+@audit.violation.implements(BristleRing)
+@inlined
+def violation_on_bristles(scene, mode, forcing, y, rates, s, tolerance):
     """Implement :func:`audit.violation` for laws with bristles; the rate of each deflection is checked too."""
     now, terms, largest = audited(scene, mode, forcing, y)
     scene = laden(scene.drive, scene, forcing)

@@ -115,8 +115,8 @@ def deflection_rates(count, bristles):
 
 
 @unrolled
-def _zeros(count, bristles):
-    """As many zeros as there are bundles of bristles."""
+def zeros(count, numbers):
+    """As many zeros as there are numbers."""
     return [f"return ({'0.0, ' * count})"]
 
 
@@ -138,8 +138,9 @@ def _rows_of_deflections(count, bristles):
     return [f"return ({''.join(rows)})"]
 
 
-@implicit.rates.implements(Ring, BristleRing, Belt, BristleBelt)
-def _rates_in_slip(scene, mode, common, forcing, x):
+@implicit.rates.implements(Ring, BristleRing)
+@inlined
+def rates_in_slip(scene, mode, common, forcing, x):
     """Implement :func:`implicit.rates`: of the place, of the sliding velocity, and of the deflections."""
     now, scene = slip(scene, mode, common, forcing, x), laden(scene.drive, scene, forcing)
     acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
@@ -153,8 +154,9 @@ def pulled(drive, now, forcing):
     return force_rate(drive, forcing) + now.K[0] * load_rate(drive, 0.0, forcing)
 
 
-@implicit.linearise.implements(Ring, BristleRing, Belt, BristleBelt)
-def _linearise_slip(scene, mode, common, t, forcing, x):
+@implicit.linearise.implements(Ring, BristleRing)
+@inlined
+def linear_slip(scene, mode, common, t, forcing, x):
     """Implement :func:`implicit.linearise`."""
     now, scene = slip(scene, mode, common, forcing, x), laden(scene.drive, scene, forcing)
     radius = ring.radius(scene.body)
@@ -162,7 +164,7 @@ def _linearise_slip(scene, mode, common, t, forcing, x):
     by_place, by_v, by_drive = acceleration_slopes(scene, now)
     by_force = pulled(scene.drive, now, forcing) / scene.body.mass
     by_time = by_place * forcing[1] + by_drive * forcing[2] + by_force - radius * drives.jerk_at(scene.drive, t)
-    nothing = _zeros(now.bristles)
+    nothing = zeros(now.bristles)
     first = joined((0.0, 1.0 / radius), nothing)
     second = joined((by_place, by_v), by_deflections(now.bristles, scene, now))
     return (

@@ -162,10 +162,6 @@ class BristleBelt(Belt):
     """Belt with a friction law of bristles: their deflection is a third state variable. It has no viscous friction."""
 
 
-class StopBelt(Belt):
-    """Belt with end stops for the body, and a friction law of the velocity."""
-
-
 class Stops(NamedTuple):
     """End stops at rest in space.
 
@@ -175,11 +171,8 @@ class Stops(NamedTuple):
         Places of the stops, m; beyond all places if there is none.
     restitution : float
         Coefficient of restitution, 1.
-    free : Belt
-        The same cells without stops.
     """
 
     low: Leaf
     high: Leaf
     restitution: Leaf
-    free: Any

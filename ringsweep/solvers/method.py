@@ -68,12 +68,11 @@ class Method(ABC):
             If the method does not take the law; if the model lacks a function that it needs; or if the file of law,
             drive, model or method is not known to the cache of compiled code.
         """
-        section = "stops" if structure.model == "belt" else "impact"
-        if structure.impact and family_of(structure.law_type) is Dynamic:
+        if structure.impact and structure.model != "belt" and family_of(structure.law_type) is Dynamic:
             raise InputError(
-                f"scene.{section}",
+                "scene.impact",
                 f"friction law {structure.law} has bristles, which have no state in an impact: "
-                f"choose a law without bristles, or leave {section} out",
+                "choose a law without bristles, or leave impact out",
             )
         asked = [name for name in ("exponent", "section") if getattr(structure, name)]
         if asked and TRAITS[structure.law_type].snaps:

@@ -11,13 +11,14 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.models.belt.force import breakaway_force, in_segment, length_scale, moving, slip_from, speed_scale
+from ringsweep.models.belt.mode import yields
+from ringsweep.models.belt.stops import SUMMED, beside_stops
 from ringsweep.models.interface import audit, implicit
-from ringsweep.models.sliding import audited, imbalances, larger, speed_in
+from ringsweep.models.sliding import audited, imbalances, larger, speed_in, violation_on_bristles
 from ringsweep.models.slip import acceleration_slopes, slip
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt, laden
 from ringsweep.physics.forces import force_in
-from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.quantities.flags import OSCILLATORY, SEPARATING
 
 # An oscillation is certain if the two runs of a cell differ by less than this share of its swing.
@@ -66,12 +67,20 @@ def _violation_on_belt(scene, mode, forcing, y, rates, s, tolerance):
         (K, _), motion = now.K, now.motion
         relaxation = abs(acceleration_slopes(scene, now)[1])
         # In a dead band the sliding velocity need not have the direction of the force.
-        if not (holds_in_band(scene.law) and mode.region < 0):
+        if not yields(scene, mode):
             speed = speed_in(scene, mode, speed)
             largest = -mode.sign * v / (tolerance * speed)
     scales = (1.0 / s + relaxation) * tolerance * speed, _terms(body, motion, forcing), tolerance
     violation, power = imbalances(scene, (K, K), ring.reactions(body, K, K, motion), motion, forcing, rates[1], scales)
-    return larger(largest, violation), power
+    found = larger(largest, violation), power
+    return beside_stops(scene.stops, scene, mode, forcing, y, s, tolerance, found)
+
+
+@audit.violation.implements(BristleBelt)
+def _violation_on_bristle_belt(scene, mode, forcing, y, rates, s, tolerance):
+    """Implement :func:`audit.violation` for laws with bristles."""
+    found = violation_on_bristles(scene, mode, forcing, y, rates, s, tolerance)
+    return beside_stops(scene.stops, scene, mode, forcing, y, s, tolerance, found)
 
 
 @inlined
@@ -97,9 +106,17 @@ def _audited_on_bristle_belt(scene, mode, forcing, y):
 
 @audit.undecided.implements(Belt, BristleBelt)
 def _undecided_on_belt(batch, one, other, fall_rates):
-    """Implement :func:`audit.undecided`: sliding or oscillatory, and separated or not."""
+    """Implement :func:`audit.undecided`: sliding or oscillatory, separated or not, and as many impacts or not."""
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        return _sliding_or_swing(batch, one, other) | _may_hold(batch, one, other, fall_rates)
+        found = _sliding_or_swing(batch, one, other) | _may_hold(batch, one, other, fall_rates)
+    return found | (one.impacts != other.impacts) if batch.stops else found
+
+
+@audit.of_events.implements(Belt, BristleBelt)
+def _of_impacts(batch, one):
+    """Implement :func:`audit.of_events`: rebounds are summed."""
+    hit = one.impacts > 0.0 if batch.stops else np.zeros(len(batch.span), dtype=bool)
+    return hit & False, hit, SUMMED * hit
 
 
 def _sliding_or_swing(batch, one, other):

@@ -9,22 +9,23 @@ Read :mod:`ringsweep.physics.friction.presliding` first. `sign` is the direction
 
 from __future__ import annotations
 
-from ringsweep.compile import absorbed, inlined
+from ringsweep.compile import absorbed
 from ringsweep.models.belt.force import length_scale
+from ringsweep.models.belt.mode import NORMAL, SLOW, Mode, after_guard, mode_at
 from ringsweep.models.belt.record import record_at_launch
-from ringsweep.models.belt.series import Mode
+from ringsweep.models.belt.switch import deflection_at_start
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
 from ringsweep.models.slip import Slip, bundled, region_guards, slip, slip_at
 from ringsweep.numerics.functions import select
 from ringsweep.numerics.memory import select_all
+from ringsweep.numerics.terms import joined
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import BristleBelt, laden
 from ringsweep.physics.forces import force_in, load_rate
 from ringsweep.physics.friction.presliding import (
     after_yield,
-    initial_deflection,
     region_guard,
     scales,
     shown,
@@ -46,17 +47,11 @@ def _in_band(scene, v, z, sign):
     return region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0
 
 
-@inlined
-def _deflection_at_start(scene):
-    """Deflection of the bristles at t = 0, m. It also resets the memory that the law may have."""
-    return initial_deflection(scene.law, scene.mu_s, scene.mu_k) + scene.initial_z
-
-
 @constant_step.initial_state.implements(BristleBelt)
 def _initial_state_on_bristle_belt(scene):
     """Implement :func:`constant_step.initial_state`: ``(x, velocity, z)``; m, m/s in space, m."""
     velocity = scene.initial_v + drives.turn(scene.drive, 0.0)[1]
-    return scene.initial_x, velocity, _deflection_at_start(scene)
+    return joined((scene.initial_x, velocity), deflection_at_start(scene.initial_z, scene))
 
 
 @slip_in_space.implements(BristleBelt)
@@ -84,21 +79,19 @@ def _keep_deflection(scene, row, column, y):
         row[column] = shown(scene.law, y[2])
 
 
-@modes.begin.implements(BristleBelt)
-def _begin_on_bristle_belt(scene):
-    """Implement :func:`modes.begin`; the state is ``(x, v, z)``."""
-    t, z = drives.beginning(scene.drive), _deflection_at_start(scene)
-    v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
-    y = scene.initial_x, v, z
+@mode_at.implements(BristleBelt)
+def _mode_at_on_bristle_belt(scene, place, t, y):
+    """Implement :func:`mode_at`."""
+    _, v, z = y
     sign = 1 if v > 0.0 else -1
-    now = slip_at(scene, Mode(1, BAND, -1, ()), t, y)
+    now = slip_at(scene, Mode(1, BAND, -1, place, ()), t, y)
     forcing = drives.turn(scene.drive, t)
     body = laden(scene.drive, scene, forcing).body
     acceleration, _ = ring.acceleration(body, *now.K, now.motion)
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
         sign = 1 if acceleration > forcing[2] else -1
-    mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC, -1, ())
+    mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC, -1, place, ())
     load = ring.reactions(body, *now.K, now.motion)[0]
     if load == 0.0:
         # The contact holds if the load begins to grow.
@@ -107,21 +100,19 @@ def _begin_on_bristle_belt(scene):
         opens = load <= 0.0
     else:
         opens = load < 0.0
-    return t, y, (SEPARATED_1 if ring.if_load_varies(scene.body, opens, False) else RUNNING), mode
+    return (SEPARATED_1 if ring.if_load_varies(scene.body, opens, False) else RUNNING), mode
 
 
-@modes.switch.implements(BristleBelt)
-def _switch_on_bristle_belt(scene, mode, guard, t, y):
-    """Implement :func:`modes.switch`; `guard` is an index into what ``creep.all_guards`` returns."""
+@after_guard.implements(BristleBelt)
+def _after_guard_on_bristle_belt(scene, mode, guard, t, y):
+    """Implement :func:`after_guard`; FAST is the guard of the bristles."""
     x, v, z = y
-    # The order is that of `all_guards`.
-    after_normal = ring.if_load_varies(scene.body, guard - 1, guard)
-    if after_normal < 0:
+    if guard == NORMAL:
         return SEPARATED_1, mode, y
-    if after_normal == 0:
-        return RUNNING, Mode(-mode.sign, BAND, -1, ()), (x, 0.0, z)
+    if guard == SLOW:
+        return RUNNING, Mode(-mode.sign, BAND, -1, mode.place, ()), (x, 0.0, z)
     z, region = after_yield(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
-    return RUNNING, Mode(mode.sign, region, -1, ()), (x, v, z)
+    return RUNNING, Mode(mode.sign, region, -1, mode.place, ()), (x, v, z)
 
 
 @modes.is_lost.implements(BristleBelt)

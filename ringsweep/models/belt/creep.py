@@ -10,21 +10,23 @@ from math import inf, nan
 
 from ringsweep.compile import feature, inlined, unrolled
 from ringsweep.models.belt.force import coefficients, if_force, in_segment, length_scale, located
+from ringsweep.models.belt.mode import yields
+from ringsweep.models.belt.stops import guarded, held_linear, held_rates, is_away
 from ringsweep.models.interface import implicit, modes
-from ringsweep.models.slip import Slip, region_guards, relaxes, slip
+from ringsweep.models.slip import Slip, linear_slip, rates_in_slip, region_guards, relaxes, slip
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import belt, drives, ring, zones
 from ringsweep.physics.belt import laden
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.presliding import shown  # noqa: F401
-from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import friction_in, stiction_band
 
 
 @implicit.is_stiff.implements(belt.Belt)
 def _is_stiff_on_belt(scene, mode, y, linear):
     """Implement :func:`implicit.is_stiff`: friction relaxes faster than the spring swings."""
-    return relaxes(scene, linear, (scene.body.stiffness / scene.body.mass) ** 0.5)
+    is_stiff = relaxes(scene, linear, (scene.body.stiffness / scene.body.mass) ** 0.5)
+    return is_stiff and is_away(scene.stops, mode, y)
 
 
 @implicit.error_scales.implements(belt.Belt)
@@ -42,11 +44,23 @@ def _slip_of_belt(scene, mode, common, forcing, x):
     v, sign, scene = x[1], 1.0 if x[1] >= 0.0 else -1.0, in_segment(scene.surface, scene, mode.place)
     mu, slope = friction_in(scene.law, mode.region, abs(v), coefficients(scene, float(mode.sign)))
     # In a dead band friction balances all other forces.
-    yields = holds_in_band(scene.law) and mode.region < 0
-    viscous = 0.0 if yields else if_force(scene.body, scene.viscous, 0.0)
-    velocity = forcing[1] if yields else v + forcing[1]
+    in_band = yields(scene, mode)
+    viscous = 0.0 if in_band else if_force(scene.body, scene.viscous, 0.0)
+    velocity = forcing[1] if in_band else v + forcing[1]
     motion = x[0] + forcing[0], force_in(scene.drive, forcing) - viscous * v, velocity
     return Slip(motion, v, (-sign * mu, -sign * mu), (-slope, -slope), viscous / scene.body.mass, ())
+
+
+@implicit.rates.implements(belt.Belt, belt.BristleBelt)
+def _rates_on_belt(scene, mode, common, forcing, x):
+    """Implement :func:`implicit.rates`."""
+    return held_rates(mode.stop, rates_in_slip(scene, mode, common, forcing, x), forcing)
+
+
+@implicit.linearise.implements(belt.Belt, belt.BristleBelt)
+def _linearise_on_belt(scene, mode, common, t, forcing, x):
+    """Implement :func:`implicit.linearise`."""
+    return held_linear(mode.stop, linear_slip(scene, mode, common, t, forcing, x), scene, t, forcing)
 
 
 @inlined
@@ -74,9 +88,10 @@ def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
     normal, _ = ring.reactions(body, *now.K, now.motion)
     friction = now.damping * body.mass * x[1] - now.K[0] * normal
     place, _, velocity = now.motion
-    seen = place, velocity, acceleration, friction, x[0], x[1], forcing[2], deflection(x, scene.law, nan)
     guards = all_guards(body, normal, *region_guards(scene, mode, common, x))
-    return _with_edges(scene.surface, guards, mode.place, place, forcing[0]), seen
+    guards = _with_edges(scene.surface, guards, mode.place, place, forcing[0])
+    guards, acceleration = guarded(scene.stops, guards, mode, place, acceleration)
+    return guards, (place, velocity, acceleration, friction, x[0], x[1], forcing[2], deflection(x, scene.law, nan))
 
 
 @unrolled
@@ -104,12 +119,13 @@ def _sought_on_belt(scene, record, view):
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
 def _near_zero_on_belt(scene, motion):
     """Implement :func:`implicit.near_zero`: a twentieth of the weight for the reaction, nothing for the others."""
-    return _with_nothing(scene.surface, all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0))
+    least = all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0)
+    return with_nothing(scene.stops, with_nothing(scene.surface, least))
 
 
 @feature("guards")
-def _with_nothing(surface, guards):
-    """Numbers for guards, and behind them 0 for both edges."""
+def with_nothing(part, guards):
+    """Numbers for guards, and behind them 0 for both edges or stops of a part of the scene."""
     return joined(guards, (0.0, 0.0))
 
 

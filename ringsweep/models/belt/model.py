@@ -339,7 +339,7 @@ def _on_incline(values: Values) -> Values:
 def _at_steady_slip(structure: Structure, values: Values, scene: Any) -> Any:
     """Cells whose body rests in space, where friction balances the spring and the forces that do not vary."""
     where, law = "initial.steady", structure.law_type
-    velocity = values.get("belt.velocity", values.get("drive.amplitude"))
+    velocity = _constant_velocity(values)
     if structure.drive not in ("none", "constant") or velocity is None:
         raise InputError(f"scene.{where}", "needs a belt of constant velocity: give belt.velocity")
     if structure.own_load is not None or structure.load is not None:
@@ -358,6 +358,11 @@ def _at_steady_slip(structure: Structure, values: Values, scene: Any) -> Any:
     load = body.mass * body.gravity + growth * x
     require(load > 0.0, where, load, "there is none: the normal load would be {} N")
     return scene._replace(initial_x=x, initial_v=-velocity, **({"initial_z": -deflection} if bristles else {}))
+
+
+def _constant_velocity(values: Values) -> Any:
+    """Velocity of a belt that does not change it, m/s; None if it is not given as a number."""
+    return values.get("belt.velocity", values.get("drive.amplitude"))
 
 
 def _steady_friction(scene: Any, v: float) -> tuple[float, float]:
@@ -480,10 +485,6 @@ class StopBelt(Belt):
 
     outcomes: ClassVar[tuple[str, ...]] = (*Outcome._fields, "impacts", "impact_speed_max")
 
-    def scene_type(self, structure: Structure) -> type:
-        """``StopBelt``; without stops that of the belt."""
-        return belt.StopBelt if structure.impact else super().scene_type(structure)
-
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Parameters of a scene of this structure, by path."""
         return super().parameters(structure) | {
@@ -499,25 +500,23 @@ class StopBelt(Belt):
 
     def build(self, structure: Structure, values: Values) -> belt.Belt:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
-        if friction.TRAITS[structure.law_type].dead_band:
-            raise InputError(
-                "scene.stops", f"cannot stand beside the dead band of law {structure.law}: leave stops out"
-            )
-        if structure.own_load is not None or structure.load is not None:
-            raise InputError("scene.stops", "cannot stand beside body.load, a load that varies in time: leave one out")
-        if structure.arcs:
-            raise InputError("scene.stops", "cannot stand beside zones: leave stops out")
         if "stops.low" not in values and "stops.high" not in values:
             raise InputError("scene.stops", "low or high is missing: give one of them or both, such as `high: 2 cm`")
-        free = super().build(replace(structure, impact=False), values)
+        free, e = super().build(structure, values), values["stops.restitution"]
         (low, high), x, where = _stops(values), free.initial_x, "initial.steady" if structure.steady else "initial.x"
         require(low < high, "stops.low", low, "{} m is not below stops.high")
         require(x >= low, where, x, "{} m is below stops.low: the body must start between the stops")
         require(x <= high, where, x, "{} m is above stops.high: the body must start between the stops")
+        if friction.TRAITS[structure.law_type].dead_band:
+            # In the band a body moves with its belt, also against a stop.
+            speed, band = abs(_constant_velocity(values)), values["friction.dead_band"]
+            require((speed == 0.0) | (speed > band), "friction.dead_band", band, _TOO_WIDE)
         # Rebounds happen at one place, without a spring too.
-        free = free._replace(place_counts=np.ones(len(low)))
-        return belt.StopBelt(*free)._replace(stops=belt.Stops(low, high, values["stops.restitution"], free))
+        return free._replace(place_counts=np.ones(len(low)), stops=belt.Stops(low, high, e))
 
+
+# Problem of a dead band beside stops.
+_TOO_WIDE = "{} m/s must be less than the speed of the belt, which slides along under a body at a stop"
 
 # Where no stop is.
 _NOWHERE = 1e300

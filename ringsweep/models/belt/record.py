@@ -16,12 +16,14 @@ from typing import Any, NamedTuple
 from ringsweep.compile import absorbed, feature, inlined, replacing
 from ringsweep.models import cycles, section, tangent
 from ringsweep.models.belt.force import breakaway_force
+from ringsweep.models.belt.stops import no_impact
 from ringsweep.models.cycles import RETURN, Cycles, Mark
-from ringsweep.models.interface import recorder, shock
+from ringsweep.models.interface import modes, recorder, shock
 from ringsweep.models.interface.status import BROKEN, COMPLETE, SEPARATED_1
 from ringsweep.models.turn import Interval, between, turn_within
 from ringsweep.numerics.functions import any_of, lanes_body, negated, select, square_root
 from ringsweep.numerics.memory import select_all
+from ringsweep.numerics.terms import joined
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import largest_force
@@ -127,28 +129,6 @@ class Stops(NamedTuple):
     first_slip: Any
 
 
-class AtStop(NamedTuple):
-    """A body between end stops.
-
-    Attributes
-    ----------
-    rests : int
-        1 or -1 while the body rests at the upper or lower stop, else 0.
-    impacts, speed_max : float
-        Number of impacts up to now, and largest speed before one, m/s.
-    velocity : float
-        Velocity in space after the last impact, m/s.
-    lasts : float
-        Time from that impact until rebounds that are summed end, s.
-    """
-
-    rests: int
-    impacts: float
-    speed_max: float
-    velocity: float
-    lasts: float
-
-
 class Record(NamedTuple):
     """Record of a run on the belt; lengths in m, velocities in m/s, times in s, forces in N.
 
@@ -170,7 +150,7 @@ class Record(NamedTuple):
     section : Points
         Points of the section; an empty tuple if none is asked for.
     at_stop : AtStop
-        An empty tuple without stops.
+        An empty tuple without end stops.
     """
 
     band: Any
@@ -190,12 +170,9 @@ class Record(NamedTuple):
 
 #: Record with another tangent.
 with_tangent = replacing("tangent")
-#: Record of a body that is elsewhere between its stops.
-with_stop = replacing("at_stop", "stops")
-#: Stops of which the present one began at another time.
-with_since = replacing("since")
 _entered, _with_section, _with_shocks = replacing("force_max", "shocks"), replacing("section"), replacing("shocks")
 _with_extremes, _with_half = replacing("low", "high"), replacing("next", "half_t", "half_x")
+_with_stop, _with_since = replacing("at_stop", "stops"), replacing("since")
 
 # A swing has no bound if it is so many times the scales of the scene, and its growth in a cycle falls by less than the
 # second share between two parts of the record.
@@ -252,7 +229,7 @@ def record_at_launch(scene, t, seen, band, play):
         shock.at_launch(acceleration),
         tangent.undisturbed(scene.asked, scene, t),
         (),
-        (),
+        no_impact(scene.stops),
     )
 
 
@@ -465,7 +442,8 @@ def _cycles(scene, r, stops, now, v, turn, span):
 @recorder.conclude.implements(Belt, BristleBelt)
 def _conclude_on_belt(scene, record, status, t, place, velocity):
     """Implement :func:`recorder.conclude`: the numbers of :class:`Outcome`, and what the scene asks for besides."""
-    r, x = record, place
+    r = record
+    x, velocity = _held(r.at_stop, scene, place, velocity)
     if r.x_max - r.x_min <= _AT_ONE_PLACE * abs(r.last.velocity - r.last.v) * t:
         r = with_tangent(r, tangent.at_rest(r.tangent, t - r.cycles.reference.t))
     if holds_in_band(scene.law) and r.band > 0.0:
@@ -499,7 +477,21 @@ def _conclude_on_belt(scene, record, status, t, place, velocity):
         r.force_max,
         *shock.largest_jump(r.shocks),
     )
-    return tangent.with_exponent(r.tangent, outcome, period, scene)
+    return tangent.with_exponent(r.tangent, _with_impacts(r.at_stop, outcome), period, scene)
+
+
+@feature("x, velocity")
+def _held(at_stop, scene, x, velocity):
+    """Displacement, m, and velocity, m/s, of a body that may rest at a stop: exactly there, and exactly zero."""
+    if at_stop.rests == 0:
+        return x, velocity
+    return scene.stops.high if at_stop.rests > 0 else scene.stops.low, 0.0
+
+
+@feature("outcome")
+def _with_impacts(at_stop, outcome):
+    """Outcome, and behind it the number of impacts and the largest speed before one, m/s."""
+    return joined(outcome, (at_stop.impacts, at_stop.speed_max))
 
 
 @inlined
@@ -636,7 +628,35 @@ def _after_event_on_belt(scene, record, before, mode, t):
     """Implement :func:`recorder.after_event`: under a smooth law the acceleration jumps at the edge of a zone alone."""
     if before.place != mode.place:
         return record
-    return _with_shocks(record, shock.without_jump(family(scene.law), record.shocks))
+    record = _with_shocks(record, shock.without_jump(family(scene.law), record.shocks))
+    return _after_impact(mode.stop, scene, record, mode, t)
+
+
+@recorder.after_event.implements(BristleBelt)
+def _after_event_on_bristle_belt(scene, record, before, mode, t):
+    """Implement :func:`recorder.after_event`."""
+    return _after_impact(mode.stop, scene, record, mode, t)
+
+
+@feature("record")
+def _after_impact(stop, scene, record, mode, t):
+    """Record of a body between stops after an event: an impact is an observation that lasts no time."""
+    r, last = record, record.last
+    if stop.impacts == r.at_stop.impacts:
+        return _with_stop(r, stop, r.stops)
+    low, high, rate = scene.stops.low, scene.stops.high, last.v_rate
+    x = high if high - last.x < last.x - low else low
+    v, force = last.v + (stop.velocity - last.velocity), last.pull - scene.body.mass * rate
+    seen = x, stop.velocity, force, last.place, v, rate, shock.Located(nan, 0.0), _deflection(r.section)
+    r = recorder.observe(scene, r, t, 0.0, modes.sticks(scene, mode), seen)
+    # Stick on a belt at rest begins as the last rebounds end.
+    return _with_stop(r, stop, _with_since(r.stops, r.stops.since + stop.lasts))
+
+
+@feature("nan")
+def _deflection(section):
+    """Deflection at the last observation, m; NaN if it is not known, or without bristles."""
+    return section.deflections[0]
 
 
 @recorder.enter.implements(Belt, BristleBelt)

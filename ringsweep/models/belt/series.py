@@ -10,45 +10,57 @@ the rows that are named below. In a kernel the order of statements counts: each 
 from __future__ import annotations
 
 from math import nan
-from typing import Any, NamedTuple
 
 from ringsweep.compile import feature, inlined
 from ringsweep.models.belt.force import (
     breakaway_force,
     coefficients,
-    direction,
     if_force,
     in_segment,
     length_scale,
     located,
-    moving,
     rounding_of_reserve,
     speed_scale,
-    stuck_pull,
-    stuck_rates,
 )
-from ringsweep.models.interface import modes, series
-from ringsweep.models.interface.status import RUNNING, SEPARATED_1
+from ringsweep.models.belt.mode import (
+    ACCELERATION,
+    CUBE,
+    EDGE_ABOVE,
+    EDGE_BELOW,
+    FACTORS,
+    FAST,
+    FORCE,
+    LOAD,
+    NORMAL,
+    PUSH,
+    RATIO,
+    SHIFT,
+    SLOW,
+    SQUARE,
+    VELOCITY,
+    V,
+    X,
+    low_stop,
+    rows_with_stops,
+    yields,
+)
+from ringsweep.models.belt.stops import expand_stops, rests_at
+from ringsweep.models.interface import series
 from ringsweep.models.sliding import expand_bounds, speed_in
-from ringsweep.numerics.clock import Instant
 from ringsweep.numerics.series import INVERSE, ORDER, crossings, differentiate, slope, step_within, value, variation
 from ringsweep.numerics.terms import (
-    FACTOR_ROWS,
-    MOST_GROUPS,
     inner_products,
     no_factors,
     part_from,
     set_factors,
 )
 from ringsweep.physics import belt, drives, ring, zones
-from ringsweep.physics.forces import Laden, expand_force, expand_load, force_in, largest_force
+from ringsweep.physics.forces import Laden, expand_force, expand_load, largest_force
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import (
-    KINETIC,
     begin_series,
     friction_in,
     no_products,
-    region_at,
     region_bounds,
     series_term,
     shorten_for_decay,
@@ -56,155 +68,11 @@ from ringsweep.physics.friction.velocity import (
 )
 from ringsweep.physics.friction.ways import along
 
-# Rows of the table of series; the guards are last.
-X, V, VELOCITY, ACCELERATION, FORCE, SHIFT, PUSH, LOAD, SQUARE, CUBE, RATIO, FACTORS = range(12)
-_GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
-# The normal reaction is a guard only if it varies.
-NORMAL, SLOW, FAST, EDGE_ABOVE, EDGE_BELOW = range(_GUARDS, _GUARDS + 5)
 
-
-class Mode(NamedTuple):
-    """Mode of the belt.
-
-    Attributes
-    ----------
-    sign : int
-        Sign of the sliding velocity; 0 if the contact is stuck. In a dead band after breakaway, the sign of the pull.
-    region : int
-        Region of the friction law.
-    entry_guard : int
-        Row of the guard that is zero on entry, or -1.
-    place : tuple of int
-        Segment and turn of the surface; an empty tuple without zones.
-    """
-
-    sign: int
-    region: int
-    entry_guard: int
-    place: Any
-
-
-@modes.in_space.implements(belt.Belt)
-def _in_space_on_belt(scene, t, y):
-    """Implement :func:`modes.in_space`."""
-    forcing = drives.turn(scene.drive, t)
-    return y[0], moving(scene, y[1] + forcing[1], y[1], forcing[1])
-
-
-@series.table_shape.implements(belt.Belt)
+@series.table_shape.implements(belt.Belt, belt.BristleBelt)
 def _table_shape_on_belt(scene):
-    """Implement :func:`series.table_shape`; the reaction is a guard if it varies, edges if there are zones."""
-    return _rows(scene.surface), ring.if_load_varies(scene.body, NORMAL, SLOW)
-
-
-@feature("FAST + 1")
-def _rows(surface):
-    """Number of rows of the table."""
-    return EDGE_BELOW + 1
-
-
-@feature("()")
-def _place_at(surface, x, shift):
-    """Segment and turn of the surface under a body at `x`, on a belt that has moved by `shift`, m."""
-    return zones.locate(surface, zones.place_in(surface.frame, x, shift))
-
-
-@modes.begin.implements(belt.Belt)
-def _begin_on_belt(scene):
-    """Implement :func:`modes.begin`; the state is ``(x, v)``."""
-    t, x = drives.beginning(scene.drive), scene.initial_x
-    v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
-    place = _place_at(scene.surface, x, drives.turn(scene.drive, Instant(t, 0.0))[0])
-    status, mode = _mode_at(in_segment(scene.surface, scene, place), place, Instant(t, 0.0), x, v)
-    return t, (x, v), status, mode
-
-
-@modes.after_jump.implements(belt.Belt)
-def _after_jump_on_belt(scene, mode, t, y, jump):
-    """Implement :func:`modes.after_jump`."""
-    x, v = y[0], y[1] - jump
-    status, mode = _mode_at(in_segment(scene.surface, scene, mode.place), mode.place, t, x, v)
-    return status, mode, (x, v)
-
-
-@inlined
-def _mode_at(scene, place, t, x, v):
-    """Status and mode of a body at `x`, m, with a sliding velocity, m/s; `scene` has the friction of the `place`."""
-    laden = belt.laden_at(scene.drive, scene, t)
-    status, mode = RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1, place)
-    if ring.if_load_varies(scene.body, True, False) and ring.reactions(laden.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
-        status, mode = SEPARATED_1, Mode(0, KINETIC, -1, place)
-    elif holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
-        mode = mode_at_rest(scene, place, t, x)
-    elif v == 0.0:
-        pull = stuck_pull(scene, x, v, drives.turn(scene.drive, t))
-        mode = Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW, place)
-    return status, mode
-
-
-@inlined
-def mode_at_rest(scene, place, t, x):
-    """Mode of a set-valued law at a sliding velocity of zero or within the dead band; `place` as in a mode."""
-    forcing = drives.turn(scene.drive, t)
-    scene, pull = belt.laden(scene.drive, scene, forcing), stuck_pull(scene, x, 0.0, forcing)
-    bound = breakaway_force(scene, direction(scene.mu_s, pull, scene, t, x, forcing), x)
-    least = rounding_of_reserve(scene, (x, force_in(scene.drive, forcing), forcing[1]), forcing[2])
-    if bound == 0.0 and pull == 0.0:
-        # Rates decide: a load that only begins to grow holds a pull that grows more slowly.
-        (pull, load), least = stuck_rates(scene, t, x, forcing), 0.0
-        bound = along(scene.mu_s, pull) * load
-    if bound > 0.0 and abs(pull) <= bound + least:
-        return Mode(0, KINETIC, -1, place)
-    return _loose(scene, place, 1 if pull >= 0.0 else -1)
-
-
-@inlined
-def _loose(scene, place, sign):
-    """Mode of a body that has just broken loose."""
-    # Without a dead band the sliding velocity, which is zero here, is a guard.
-    return Mode(sign, region_at(scene.law, 0.0), SLOW if stiction_band(scene.law) == 0.0 else -1, place)
-
-
-@modes.switch.implements(belt.Belt)
-def _switch_on_belt(scene, mode, guard, t, y):
-    """Implement :func:`modes.switch`; `guard` is NORMAL, SLOW or FAST, or an edge."""
-    x, _ = y
-    if guard == NORMAL:
-        return SEPARATED_1, mode, y
-    sign, region, place = mode.sign, mode.region, mode.place
-    if guard > FAST:
-        place = _beyond(scene.surface, place, 1 if guard == EDGE_ABOVE else -1)
-        scene = in_segment(scene.surface, scene, place)
-        if holds_in_band(scene.law) and y[1] == 0.0:
-            return RUNNING, mode_at_rest(scene, place, t, x), y
-        return RUNNING, Mode(sign, region, SLOW if y[1] == 0.0 else -1, place), y
-    scene = in_segment(scene.surface, scene, place)
-    if sign == 0:
-        # A long series may reach the breakaway force by its own error alone: one more, short step decides.
-        forcing = drives.turn(scene.drive, t)
-        pull, laden = stuck_pull(scene, x, 0.0, forcing), belt.laden(scene.drive, scene, forcing)
-        if mode.entry_guard != guard and abs(pull) <= breakaway_force(laden, pull, x):
-            return RUNNING, Mode(0, KINETIC, guard, place), y
-        return RUNNING, _loose(scene, place, 1 if guard == SLOW else -1), y
-    low, high = region_bounds(scene.law, region)
-    if guard == FAST:
-        return RUNNING, Mode(sign, region + 1, SLOW, place), (x, sign * high)
-    if low > 0.0:
-        if holds_in_band(scene.law) and region - 1 < 0:
-            return RUNNING, mode_at_rest(scene, place, t, x), (x, sign * low)
-        return RUNNING, Mode(sign, region - 1, FAST, place), (x, sign * low)
-    if holds_in_band(scene.law) and region < 0:
-        # The pull has fallen to the breakaway force.
-        return RUNNING, Mode(0, KINETIC, -1, place), y
-    if region < 0:
-        return RUNNING, Mode(-sign, region, SLOW, place), (x, 0.0)
-    return RUNNING, mode_at_rest(scene, place, t, x), (x, 0.0)
-
-
-@feature("place")
-def _beyond(surface, place, direction):
-    """Place of a body that has crossed the edge of its segment."""
-    return zones.cross_edge(surface, place, direction)
+    """Implement :func:`series.table_shape`; the reaction is a guard if it varies, edges and stops if there are any."""
+    return rows_with_stops(scene.stops, low_stop(scene.surface)), ring.if_load_varies(scene.body, NORMAL, SLOW)
 
 
 @feature("0.0", of=ring.having(belt.OnBelt, "cubic"))
@@ -259,9 +127,10 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
     body = scene.body
     if if_force(body, True, False):
         expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
-    c[X, 0], c[V, 0] = y
-    c[VELOCITY, 0] = y[1] + c[SHIFT, 1]
-    sharpness, yielding = 0.0, holds_in_band(scene.law) and mode.region < 0
+    held = rests_at(mode.stop)
+    c[X, 0], c[V, 0] = y[0], -c[SHIFT, 1] if held else y[1]
+    c[VELOCITY, 0] = c[V, 0] + c[SHIFT, 1]
+    sharpness, yielding = 0.0, yields(scene, mode)
     if mode.sign == 0 or yielding:
         for k in range(ORDER + 1):
             # The body moves as the belt does. In a dead band V is the momentum that is left, or builds up, by mass.
@@ -289,7 +158,7 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
             c[SLOW, 0] += least
             c[FAST, 0] += least
     else:
-        sharpness = expand_slip(scene, mode, if_force(body, scene.viscous, 0.0), c, False)
+        sharpness = _expand_slip(scene, mode, if_force(body, scene.viscous, 0.0), c, held)
         expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), 0.0)
         if _has_dead_band(scene) and mode.entry_guard == SLOW:
             # A body whose momentum is that of the edge leaves the band as the pull reaches the breakaway force.
@@ -312,6 +181,7 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
         per_force = 1.0 / (scale * tolerance)
     units = (X, 1.0 / (length * tolerance)), (V, 1.0 / (speed * tolerance)), (SLOW, per_force)
     h = step_within(c, units)
+    h = expand_stops(scene.stops, scene, mode, tolerance, c, h)
     return (h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)), h
 
 
@@ -354,7 +224,7 @@ def _from_no_load(c, sticks):
 
 
 @inlined
-def expand_slip(scene, mode, viscous, c, held):
+def _expand_slip(scene, mode, viscous, c, held):
     """Fill the series of slip and return the sharpness of the friction law.
 
     If the body is `held` at rest, the acceleration is that which the hold prevents.
@@ -410,7 +280,7 @@ def _seen_at_on_belt(scene, mode, c, s, h):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
     x, v, force, acceleration = value(c[X], s), value(c[V], s), value(c[FORCE], s), value(c[ACCELERATION], s)
-    yielding = holds_in_band(scene.law) and mode.region < 0
+    yielding = yields(scene, mode)
     if mode.sign != 0 and not yielding:
         # Where the law bends, the series of friction is less exact than that of the motion.
         sign, body = float(mode.sign), _laden_after(scene.drive, scene, c, s).body

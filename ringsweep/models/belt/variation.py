@@ -9,13 +9,12 @@ from __future__ import annotations
 from ringsweep.compile import feature, hook
 from ringsweep.models import section, tangent
 from ringsweep.models.belt.force import in_segment, stuck_gradient, stuck_rates
+from ringsweep.models.belt.mode import FAST, SLOW, yields
 from ringsweep.models.belt.record import with_tangent
-from ringsweep.models.belt.series import FAST, SLOW
 from ringsweep.models.interface import variation
-from ringsweep.physics import drives, ring, zones
+from ringsweep.physics import drives, zones
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.presliding import region_guard, scales
-from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.physics.friction.ways import along
 
@@ -73,8 +72,7 @@ def _gradient_on_belt(scene, mode, guard, t, y, rates):
     if guard > FAST:
         return _gradient_of_edge(scene.surface, rates[0], drives.turn(scene.drive, t)[1]), 0.0
     scene = in_segment(scene.surface, scene, mode.place)
-    yields = holds_in_band(scene.law) and mode.region < 0 and guard == SLOW
-    if mode.sign != 0 and not yields:
+    if mode.sign != 0 and not (yields(scene, mode) and guard == SLOW):
         return 0.0, 1.0 / rates[1] if rates[1] != 0.0 else 0.0
     x = y[0]
     # The guard is the breakaway force less the pull in one direction.
@@ -100,7 +98,7 @@ def _gradient_on_bristle_belt(scene, mode, guard, t, y, rates):
     """Implement :func:`_gradient`, by differences for the guard of the bristles."""
     _, v, z = y
     by_v, by_z = 1.0, 0.0
-    if ring.if_load_varies(scene.body, guard - 1, guard) == 1:
+    if guard == FAST:
         law, mu_s, mu_k, sign, region = scene.law, scene.mu_s, scene.mu_k, float(mode.sign), mode.region
         _, state, speed, _ = scales(law, mu_s, scene.body.gravity, z)
         dv, dz = _SMALL * speed, _SMALL * state

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ringsweep.compile import feature, hook
-from ringsweep.physics.belt import Belt, BristleBelt, StopBelt
+from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.ring import Ring
 from ringsweep.quantities.parameters import Leaf
 
@@ -44,7 +44,7 @@ class Exponent(NamedTuple):
         return cls(frequency, (1.0 / frequency, np.ones(len(frequency)), *[1.0 / frequency] * bristles))
 
 
-@feature("()", of=(Belt, BristleBelt, StopBelt, Ring))
+@feature("()", of=(Belt, BristleBelt, Ring))
 def asked(scene):
     """Field ``asked`` of a scene: an :class:`Exponent`, or an empty tuple if no exponent is asked for."""
     return scene.asked
