@@ -138,7 +138,7 @@ class TestBoundary:
             (
                 "stick-slip",
                 1e-3,
-                "regime: .* can be 'stick-slip': those of model ring are resting, .*, failed, with",
+                "regime: 'stick-slip' is not a regime of this scene .*known: resting, .*, failed",
             ),
             ("separating", 0.0, "tolerance: "),
             ("separating", True, "tolerance: "),

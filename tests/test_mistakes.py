@@ -42,7 +42,7 @@ def located(call: Any, path: str, words: str) -> None:
 
 
 TWO_ENDS = "between: the two ends of an interval are expected, such as (0.5, 8)"
-WORDS = "those of model belt are stick-slip, oscillatory, sliding, sticking, riding, failed"
+WORDS = "is not a regime of this scene (known: stick-slip, oscillatory, sliding, sticking, riding, failed, "
 
 # The keys of `sweep.sample`: what is changed, the path of the mistake, and words of its line.
 OF = "sweep.sample.of.friction.mu_s"
@@ -121,9 +121,9 @@ THRESHOLDS: list[tuple[str, Any, dict[str, Any], str]] = [
     ("friction.mu_s", (0.3, 0.2), {}, "to: 0.2 is not greater than 0.3"),
     ("friction.mu_s", (0.01, 0.4), {}, "from: friction.mu_s = 0.01 is not allowed: scene.friction.mu_k: 0.05"),
     *(("friction.mu_s", ends, {}, f"{TWO_ENDS}, got {ends!r}") for ends in ((0.12,), 3, "0.2 to 0.4")),
-    ("friction.mu_s", (0.12, 0.4), {"regime": "rideing"}, "regime: 'rideing' is not a regime; did you mean `riding`"),
+    ("friction.mu_s", (0.12, 0.4), {"regime": "rideing"}, "not a regime of this scene; did you mean `riding`"),
     *(
-        ("friction.mu_s", (0.12, 0.4), {"regime": word}, f"regime: no run of this scene can be {word!r}: {WORDS}")
+        ("friction.mu_s", (0.12, 0.4), {"regime": word}, f"regime: {word!r} {WORDS}")
         for word in ("jammed", "separating", "tumbled")
     ),
     # The load may fall to zero: the word is allowed, the interval is not.
@@ -137,7 +137,7 @@ UNCERTAIN: list[tuple[dict[str, Any], Any, str, str, str]] = [
     ({"friction.mu_s": {"uniform": [0.2, 0.3]}}, None, "riding", "path", "friction.mu_s is uncertain itself"),
     ({"friction.mu_k": {"over": "mu_s", "uniform": [0.5, 0.6]}}, None, "riding", "path", "is drawn over friction.mu_s"),
     ({"body.mass": {"uniform": [1, 2]}}, {"belt.velocity": [0.1, 0.2]}, "riding", "sweep", "also varies belt.velocity"),
-    ({"body.mass": {"uniform": [1, 2]}}, None, "rideing", "regime", "is not a regime; did you mean `riding`?"),
+    ({"body.mass": {"uniform": [1, 2]}}, None, "rideing", "regime", "of this scene; did you mean `riding`?"),
 ]
 
 # Data, paths, options, the start of the line.

@@ -67,7 +67,7 @@ class TestThreshold:
         config.write_text(json.dumps({"scene": scene}))
         asked = ["threshold", str(config), "--path", "drive.amplitude", "--from", "1", "--to", "2"]
         assert cli.main([*asked, "--regime", "tumbled"]) == 2
-        assert "it needs impact in the scene" in capsys.readouterr().err
+        assert "'tumbled' needs impact in the scene" in capsys.readouterr().err
 
     def test_axis_beside_the_threshold_has_the_value_of_the_command_line(self, tmp_path, capsys):
         """k v T = mu_s m g again, with a spring that the sweep varies."""

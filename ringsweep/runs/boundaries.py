@@ -20,7 +20,7 @@ from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import WITH_IMPACT, model_of
 from ringsweep.models.scene import Scene
-from ringsweep.quantities.flags import AFTERMATHS, LONG_RUNS, REGIMES
+from ringsweep.quantities.flags import AFTERMATHS, LONG_RUNS
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import INFERRED, configuration_of, meanings_of, swept
@@ -109,9 +109,8 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
         values = {name: column[which] for name, column in place.items()}
         for k, dim in enumerate(dims):
             values[dim] = np.where(axis[which] == k, at, values[dim])
-        found = run_points(
-            configuration, {columns[name].attrs["path"]: column for name, column in values.items()}, jobs
-        )
+        by_path = {columns[name].attrs["path"]: column for name, column in values.items()}
+        found = run_points(configuration, by_path, jobs)
         certified = (found["certified"].values == 1) | (not configuration.certifies)
         here = found[label].values == flag
         outside = ~here & certified
@@ -240,23 +239,16 @@ def check_word(word: object, scene: Scene, varied: Collection[str] = ()) -> None
     InputError
         If it is no word of a regime, of an aftermath or of a long run, or none of this scene.
     """
-    model = scene.structure.model
-    known = model_of(scene.structure).regimes({*varied, *scene.values})
-    if "long_run" in model_of(scene.structure).columns(scene.structure) and word in LONG_RUNS:
-        return
-    may_go_on = model in WITH_IMPACT and "aftermath" in WITH_IMPACT[model].outcomes
-    goes_on = may_go_on and scene.structure.impact
-    if word not in REGIMES + AFTERMATHS:
-        words = known + AFTERMATHS if goes_on else known
-        raise InputError("regime", f"{show(word)} is not a regime" + suggestion(word, words))
-    if word in known or (word in AFTERMATHS and goes_on):
-        return
-    if word in AFTERMATHS and may_go_on:
-        raise InputError("regime", f"{show(word)} is said of runs that go on: it needs impact in the scene")
-    also = f", with impact also {', '.join(AFTERMATHS)}" if may_go_on else ""
-    raise InputError(
-        "regime", f"no run of this scene can be {show(word)}: those of model {model} are {', '.join(known)}{also}"
-    )
+    structure = scene.structure
+    model, after = model_of(structure), WITH_IMPACT.get(structure.model)
+    may_go_on = after is not None and "aftermath" in after.outcomes
+    known = model.regimes({*varied, *scene.values})
+    known += LONG_RUNS if "long_run" in model.columns(structure) else ()
+    known += AFTERMATHS if may_go_on and structure.impact else ()
+    if word not in known:
+        needs_impact = may_go_on and word in AFTERMATHS
+        problem = "needs impact in the scene" if needs_impact else "is not a regime of this scene"
+        raise InputError("regime", f"{show(word)} {problem}" + suggestion(word, known))
 
 
 def _checked(ds: xr.Dataset, regime: str) -> tuple[str, int, list[str]]:
@@ -267,9 +259,8 @@ def _checked(ds: xr.Dataset, regime: str) -> tuple[str, int, list[str]]:
     dims = [str(dim) for dim in ds["regime"].dims]
     numeric = {c.name for c in swept(ds) if c.dtype.kind == "f"}
     if not numeric.issuperset(dims) or not 1 <= len(dims) <= 2:
-        raise InputError(
-            "ds", f"has the dimensions {', '.join(dims) or 'none'}: one or two axes of numbers are needed; hold others"
-        )
+        problem = "one or two axes of numbers are needed; hold others"
+        raise InputError("ds", f"has the dimensions {', '.join(dims) or 'none'}: {problem}")
     for coordinate in swept(ds):
         if coordinate.name not in dims and coordinate.dims:
             along, what = ", ".join(map(str, coordinate.dims)), coordinate.name
@@ -285,9 +276,8 @@ def _check_cells(ds: xr.Dataset, label: str, config: Config, jobs: int | None) -
             raise InputError("ds", f"has no coordinate for {path}, which its sweep varies: do not drop it")
         foreign = np.setdiff1d(known[path].values, column)
         if len(foreign):
-            raise InputError(
-                "ds", f"has {path} = {foreign[0]}, which its sweep has not: give the values and units of the sweep"
-            )
+            cure = "give the values and units of the sweep"
+            raise InputError("ds", f"has {path} = {foreign[0]}, which its sweep has not: {cure}")
     run = np.argwhere(_was_run(ds))
     if not len(run):
         # A line of a refined map may have inferred cells only.
