@@ -56,10 +56,8 @@ class Local:
         self._shared = self._workers == 1 or getattr(backend, "supports_sharedmem", False)
         self._alone = 0 if self._shared else 1
         if not self._shared and not backend.supports_return_generator:
-            raise InputError(
-                "joblib.parallel_config",
-                f"{type(backend).__name__} returns results only at the end: name another, as loky",
-            )
+            problem = f"{type(backend).__name__} returns results only at the end: name another, as loky"
+            raise InputError("joblib.parallel_config", problem)
 
     def concurrency(self) -> int:
         """Number of tasks that are computed at once, at this moment."""
@@ -196,9 +194,7 @@ class Execution:
         if self.scheduler is None:
             return nullcontext(Local(self.jobs))
         if self.jobs is not None:
-            raise InputError(
-                "--jobs", "is for threads of this machine: Dask's workers have their own number of threads"
-            )
+            raise InputError("--jobs", "is for threads of this machine: Dask's workers have numbers of their own")
         try:
             from ringsweep.runs import dask
         except ImportError:

@@ -231,10 +231,9 @@ def _ranges(config: Config, vary: Any) -> dict[str, tuple[float, float]]:
         if ends is None and path not in config.axes.columns and (own := config.scene.values.get(path)):
             halved, doubled = sorted((0.5 * own, 2.0 * own))
             ends = max(halved, known[path].lower), min(doubled, known[path].upper)
+        forms = (("--vary", f"{path}={form}") for form in ("{}..HIGH", "LOW..{}"))
         try:
-            found[path] = interval(
-                config, path, ends, ("--vary", f"{path}={{}}..HIGH"), ("--vary", f"{path}=LOW..{{}}")
-            )
+            found[path] = interval(config, path, ends, *forms)
         except InputError as error:
             form = f" ({path}=LOW..HIGH)" if path in known and np.size(ends) != 2 else ""
             raise InputError(f"vary.{path}", error.problem + form) from None

@@ -116,9 +116,8 @@ class Sampled(Grid):
         sample = self.asked
         events, own = len(REGIMES) + len(sample.survival), sample.size * len(sample.own)
         indices = len(REGIMES) + len(sample.sensitive) * max(len(sample.survival), 1)
-        numbers = (
-            2 * events + own * len(sample.quantiles) + 3 * (len(sample.factors) + 1) * indices * sample.sensitivity
-        )
+        numbers = 2 * events + own * len(sample.quantiles)
+        numbers += 3 * (len(sample.factors) + 1) * indices * sample.sensitivity
         return int(8 * numbers + sample.keep * sample.size * sample.rows * _RUN_BYTES) * int(sample.replicates)
 
     def task(self) -> Callable[[NDArray[np.integer]], TaskResult]:
@@ -192,9 +191,8 @@ class Sampled(Grid):
         sample = self.asked
         way = "Clopper and Pearson" if sample.independent else "scatter of the replicates (Korn and Graubard)"
         runs, own = sample.n * sample.rows, sample.n * len(sample.own)
-        told = f"{sample.n} points of each cell" + (
-            f": {runs} runs, {own} of them for the probabilities" * (runs > own)
-        )
+        told = f"{sample.n} points of each cell"
+        told += f": {runs} runs, {own} of them for the probabilities" * (runs > own)
         return super().attributes() | {
             "sample": f"{told}; {sample.method}, seed {sample.seed}, "
             f"{sample.replicates} replicates; " + "; ".join(f"{factor.name} {factor}" for factor in sample.factors),

@@ -66,13 +66,10 @@ class EarlierSweep:
         """Differences between what both sweeps hold fixed, in words."""
         swept = {path for axes in (self.axes, config.axes) for path in axes.columns}
         # Cells of a law do not depend on parameters that only other laws have.
-        needed: list[set[str]] = [set(parameters(structure)) for structure in config.scene.structures.values()]
-        not_fixed = (
-            swept
-            | (set().union(*needed) - needed[0].intersection(*needed))
-            | (set(config.scene.values) ^ set(self.config.scene.values))
-        )
-        ignored = {f"scene.{path}" for path in not_fixed}
+        needed = [set(parameters(structure)) for structure in config.scene.structures.values()]
+        of_some_laws = set[str]().union(*needed) - needed[0].intersection(*needed)
+        not_in_both = set(config.scene.values) ^ set(self.config.scene.values)
+        ignored = {f"scene.{path}" for path in swept | of_some_laws | not_in_both}
 
         def fixed(of: Config) -> dict[str, str]:
             known = identity(of).items()

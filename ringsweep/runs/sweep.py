@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("ringsweep")
 
+# Name of a file.
+Name = str | os.PathLike[str]
+
 # Seconds of a refined sweep that are lost if it is killed.
 _WRITE_INTERVAL = 1.0
 
@@ -115,13 +118,7 @@ def run(
     return _run(load(config, refine=refine), output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
-def _run(
-    config: Config,
-    output: str | os.PathLike[str] | None,
-    execution: Execution,
-    fresh: bool,
-    reuse: str | os.PathLike[str] | None,
-) -> xr.Dataset:
+def _run(config: Config, output: Name | None, execution: Execution, fresh: bool, reuse: Name | None) -> xr.Dataset:
     if output is None:
         return compute(config, execution, reuse=reuse)
     write(config, Path(output), execution, fresh=fresh, reuse=reuse)
@@ -213,13 +210,7 @@ def _sweep_section(axes: Axes) -> dict[str, Any]:
     return {kind: given for kind, given in (("points", points), ("grid", grid)) if given}
 
 
-def compute(
-    config: Config,
-    execution: Execution,
-    *,
-    reuse: str | os.PathLike[str] | None = None,
-    warn: bool = True,
-) -> xr.Dataset:
+def compute(config: Config, execution: Execution, *, reuse: Name | None = None, warn: bool = True) -> xr.Dataset:
     """Run a validated configuration in memory, with or without warnings about the results; see :func:`run`."""
     plan = plan_of(config, reuse, whole=True)
     layout = plan.layout
@@ -243,12 +234,7 @@ def compute(
 
 
 def write(
-    config: Config,
-    target: Path,
-    execution: Execution,
-    *,
-    fresh: bool = False,
-    reuse: str | os.PathLike[str] | None = None,
+    config: Config, target: Path, execution: Execution, *, fresh: bool = False, reuse: Name | None = None
 ) -> bool:
     """Run a validated configuration into a file, or continue such a run; see :func:`run`.
 
@@ -269,11 +255,9 @@ def write(
                 with suppress(InputError, OSError):
                     checkpoint.keep()
                 if (finished := int(checkpoint.done.sum())) and checkpoint.folder.exists():
-                    again = "the same command without --fresh" if fresh else "the same command"
-                    error.add_note(
-                        f"{finished} of {plan.layout.total} {plan.parts} are kept in {checkpoint.folder}: "
-                        f"{again} goes on"
-                    )
+                    again = f"the same command{' without --fresh' * fresh} goes on"
+                    kept = f"{finished} of {plan.layout.total} {plan.parts} are kept in {checkpoint.folder}"
+                    error.add_note(f"{kept}: {again}")
                 raise
         if not checkpoint.other:
             checkpoint.clear()

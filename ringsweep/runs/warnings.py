@@ -135,10 +135,8 @@ def _warn_of_failures(results: xr.Dataset, config: Config, failed: NDArray[np.in
     why = "a number was not finite"
     if steps >= min(PATIENCE, getattr(config.solver, "max_steps", PATIENCE)):
         span = float(one["time_span"]) if "time_span" in one.coords else config.scene.values.get("time.span", np.nan)
-        why = (
-            f"it was given up after {steps} steps at t = {float(one['t_end']):.6g} s of {span:.6g} s, "
-            "as events go on: a shorter time.span has a result"
-        )
+        why = f"it was given up after {steps} steps at t = {float(one['t_end']):.6g} s of {span:.6g} s"
+        why += ", as events go on: a shorter time.span has a result"
     elif any(structure.own_law for structure in config.scene.structures.values()):
         why = "its friction law may be negative, or no number, at a sliding speed that the body reached"
         why += f"; if it is not, {other} rtol may have a result" if finite else ""
