@@ -4,7 +4,6 @@ from math import cos, inf, pi, sin
 from types import SimpleNamespace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from ringsweep.compile import take
@@ -13,7 +12,7 @@ from ringsweep.models import batch
 from ringsweep.models.ring.record import Outcome
 from ringsweep.physics import ring
 from ringsweep.physics.friction.speeds import hidden_fields
-from ringsweep.physics.friction.velocity import EXPRESSIONS, friction_at
+from ringsweep.physics.friction.velocity import EXPRESSIONS
 from ringsweep.solvers.automaton import History, Results, integrate
 
 
@@ -233,37 +232,3 @@ class Fall:
             speed = np.sqrt(gain(place + part, part) if still else square(place + part))
             total += 0.5 * abs(way) * (NODE_WEIGHTS * rate / speed).sum()
         return total if sense else 0.0
-
-
-def imbalance(batch, run, coefficients):
-    """Largest difference between energy and work in a history, as a share of the work.
-
-    `coefficients` are ``(mu_s, mu_k)`` of the rest of the ring and of its zones. In stick of a set-valued law, friction
-    follows from the motion of the ring.
-    """
-    scene = take(batch, 0)
-    body = scene.body
-    inertia = body.inertia + body.mass * body.xi**2
-    weight = body.mass * body.gravity * body.xi
-    force = (inertia * run.epsilon + weight * np.sin(run.phi)) / body.radius
-    v = body.radius * (run.omega - run.ring_omega)
-    slips = run.mode != 0 if not hasattr(scene.law, "v0") else np.ones(len(run.t), dtype=bool)
-    for k in np.flatnonzero(slips):
-        mu = [friction_at(scene.law, abs(v[k]), tuple(pair))[0] for pair in coefficients]
-        load = mu[int(run.zone_1[k])] * run.normal_1[k] + mu[int(run.zone_2[k])] * run.normal_2[k]
-        sense = run.mode[k] or np.sign(v[k])
-        force[k] = -sense * load
-    power = body.radius * run.omega * force
-    energy = 0.5 * inertia * run.omega**2 - weight * np.cos(run.phi)
-    # At an instant that appears twice the mode changes, and the power may jump.
-    parts = np.split(np.arange(len(run.t)), np.flatnonzero(np.diff(run.t) <= 0.0) + 1)
-    work = np.zeros(len(run.t))
-    done = 0.0
-    for part in parts:
-        if len(part) > 1:
-            spline = CubicSpline(run.t[part], power[part]).antiderivative()
-            work[part] = done + spline(run.t[part])
-            done = work[part[-1]]
-        else:
-            work[part] = done
-    return np.abs(energy - energy[0] - work).max() / np.abs(work).max()

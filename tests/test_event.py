@@ -5,7 +5,7 @@ from math import atan, cos, log1p, sin
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from solutions import Fall, imbalance, motion, solve, trail
+from solutions import Fall, motion, solve, trail
 from tiers import mostly_slow
 
 from ringsweep.compile import take
@@ -174,17 +174,6 @@ class TestStick:
         assert solve(Event(), slips_at_the_end).stick_time == pytest.approx(t, abs=1e-9)
         stuck_to_the_end = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": t - 1e-6})
         assert solve(Event(), stuck_to_the_end).stick_time == t - 1e-6
-
-
-class TestEnergy:
-    """The energy of the body changes by the work of friction."""
-
-    @pytest.mark.parametrize("number", [29, 30, 32, 33])
-    def test_energy_changes_by_the_work_of_friction(self, setting, number):
-        """The tolerance covers the quadrature of the work over a sampled history."""
-        rough, rest = ((0.5, 0.3), (0.2, 0.1)) if number < 32 else ((0.2, 0.15), (0.15, 0.1))
-        batch = setting(number, "stiction")
-        assert imbalance(batch, trail(Event(), batch, 2e-4), (rest, rough)) < 1e-9
 
 
 class TestLimit:

@@ -124,41 +124,18 @@ class TestMethods:
 class TestEnergy:
     """On a ring at rest friction dissipates energy."""
 
-    @staticmethod
-    def balance(scene, run):
-        """Energy of the body, J; energy stored in the bristles, J; friction force, N."""
+    def test_energy_of_body_and_bristles_never_grows(self, launched):
+        scene, run = launched
         body = scene.body
         energy = 0.5 * (body.inertia + body.mass * body.xi**2) * run.omega**2
         energy = energy - body.mass * body.gravity * body.xi * np.cos(run.phi)
-        stored, force = np.zeros(len(run.t)), np.zeros(len(run.t))
+        total = energy.copy()
         for normal, z in ((run.normal_1, run.deflection_1), (run.normal_2, run.deflection_2)):
             change = 0.5 * (normal[1:] + normal[:-1]) * 0.5 * scene.law.sigma0 * np.diff(z**2)
-            stored[1:] += np.cumsum(change)
-            force += normal * scene.law.sigma0 * z
-        return energy, stored, force
-
-    def test_energy_of_body_and_bristles_never_grows(self, launched):
-        scene, run = launched
-        energy, stored, _ = self.balance(scene, run)
-        total = energy + stored
+            total[1:] += np.cumsum(change)
         dissipated = total[0] - total[-1]
         assert np.diff(total).max() < 1e-10 * dissipated
         assert dissipated > 0.1 * (energy.max() - energy.min())
-
-    def test_energy_of_the_body_falls_by_the_work_of_friction(self, launched):
-        scene, run = launched
-        energy, _, force = self.balance(scene, run)
-        power = force * run.omega * scene.body.radius
-        work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(run.t)))
-        assert np.abs(energy[0] - energy - work).max() < 1e-6 * work.max()
-
-    def test_stuck_body_exchanges_energy_with_the_bristles(self, launched):
-        """The stuck body vibrates on the bristles, so that energy goes back and forth."""
-        scene, run = launched
-        energy, stored, _ = self.balance(scene, run)
-        held = np.flatnonzero(run.t > 0.45)
-        assert (np.diff(energy[held]) > 0.0).any()
-        assert np.corrcoef(energy[held], stored[held])[0, 1] < -0.9
 
 
 class TestZones:
