@@ -158,26 +158,6 @@ def test_period_of_three_cycles_that_becomes_one_is_not_settled():
     assert found.period[1].item() == pytest.approx(2.0 * pi / 1.4967889908256882, rel=1e-9)
 
 
-@pytest.mark.slow
-def test_period_of_four_cycles_whose_halves_become_equal_is_not_settled():
-    """Close to a bifurcation their distance falls like a power of time, in 300 periods to 1 % of the swing."""
-    friction, frequency = {"law": "stiction", "mu_s": 0.100385, "mu_k": 0.0260402}, 0.0706694
-    of = on_belt(
-        friction,
-        1.79843,
-        mass=1.67738,
-        cubic=0.186031,
-        velocity=0.322044,
-        span=100.0,
-        gravity=9.81,
-        force=(3.35819, frequency, 0.617096),
-        start=(0.431099, 0.322044),
-    )
-    found = over(of, 2.0 * pi * frequency, [300, 3000])
-    assert found.settled.values.tolist() == [0, 1]
-    assert found.period[1].item() == pytest.approx(2.0 / frequency, rel=1e-9)
-
-
 @pytest.mark.parametrize("friction", [0.2, 0.3])
 def test_stops_that_shrink_for_ever_beside_a_continuum_do_not_settle(friction):
     """At half the natural frequency, without a damper, motions without stops lie side by side in a continuum."""

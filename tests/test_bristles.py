@@ -385,24 +385,3 @@ class TestDrift:
         assert np.abs(drift(law)).max() < 1e-10
         assert np.abs(drift(law, high=0.69)).max() < 1e-10
         assert drift(law, high=1.0).min() > 1e-8
-
-
-class TestConstantLoad:
-    """A load below breakaway is applied and removed."""
-
-    @staticmethod
-    def load(t, x):
-        return 0.6 * min(t / 0.2, 1.0, max(0.0, (1.2 - t) / 0.2))
-
-    def test_elasto_plastic_contact_returns_after_a_load(self):
-        path = pushed(of_1995(ElastoPlastic, 0.7), self.load, 2.0, times=(0.6, 0.8, 0.95, 2.0))
-        np.testing.assert_allclose(path.y[0], [6e-6, 6e-6, 6e-6, 0.0], atol=1e-9)
-        np.testing.assert_allclose(path.y[0], path.y[2], atol=1e-12)
-
-    def test_lugre_contact_does_not_return_after_a_load(self):
-        """It moves by -F_s/sigma0 ln(1 - F/F_s) while the load grows, and back by F_s/sigma0 ln(1 + F/F_s)."""
-        path = pushed(of_1995(LuGre), self.load, 2.0, times=(0.6, 0.8, 0.95, 2.0))
-        there, back = -log(1 - 0.6 / 1.5), log(1 + 0.6 / 1.5)
-        np.testing.assert_allclose(path.y[0][:3], 1.5e-5 * there, rtol=0.01)
-        assert np.ptp(path.y[0][:3]) < 1e-9
-        assert path.y[0][3] == pytest.approx(1.5e-5 * (there - back), rel=0.03)

@@ -17,7 +17,6 @@ from ringsweep.physics.friction import LAWS, TRAITS
 from ringsweep.storage.provenance import references
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", "CONTRIBUTING.md")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
@@ -69,19 +68,6 @@ def test_kept_file_of_an_earlier_version_is_read(file, tmp_path, capsys):
     config = load(file)
     assert config.axes.sizes == {"drive_amplitude": 3, "zone_half_angle": 3}
     assert config.scene.values["friction.rough.mu_s"] == 0.5
-
-
-def test_readme_and_contributing_tell_one_duration_of_the_tests():
-    pages = [(ROOT / name).read_text(encoding="utf-8") for name in PAGES]
-    told = [re.findall(r"\w+ to \w+ minutes on two cores", page) for page in pages]
-    assert len(told[0]) == 1
-    assert told[0] == told[1]
-
-
-def test_changelog_counts_the_notebooks():
-    counts = ("six", "seven", "eight", "nine", "ten", "eleven", "twelve")
-    number = len(list((ROOT / "notebooks").glob("*.ipynb")))
-    assert f"{counts[number - 6]} notebooks" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("law", LAWS)
