@@ -29,6 +29,12 @@ Numbers = dict[str, Any]
 CLOCKED = "amplitude*sin(2*pi*frequency*(t + shift) + phase)"
 TWO_TONES = "amplitude*(sin(2*pi*frequency*t) + cos(2*pi*frequency*1.618033988749895*t + phase))"
 
+#: A force and a drive that jump: the second one in its velocity.
+SQUARE = "amplitude*(sign(sin(2*pi*frequency*(t + shift))) + max(0, sin(2*pi*frequency*(t + shift) + phase)))"
+BOUNCING = "amplitude*abs(sin(pi*frequency*(t + shift)))"
+
+FORMULAS = {"clocked": CLOCKED, "two-tones": TWO_TONES, "square": SQUARE, "bouncing": BOUNCING}
+
 _TIMES = np.linspace(0.0, 32.0, 41)
 _COURSE = 0.4 * np.sin(1.3 * _TIMES) + 0.15 * np.sin(3.1 * _TIMES + 0.7) - 0.15 * np.sin(0.7)
 
@@ -40,11 +46,11 @@ class Kind:
     Attributes
     ----------
     model, law, drive : str
-        As in a scene; the drives `clocked` and `two-tones` are formulas.
+        As in a scene; the drives `clocked`, `two-tones` and `bouncing` are formulas.
     arcs : int
         Zones; one alone is the section ``zone``.
     force : str
-        ``harmonic``, ``constant``, ``clocked``, ``two-tones``, ``table``, or none.
+        ``harmonic``, ``constant``, ``clocked``, ``two-tones``, ``square``, ``table``, or none.
     parts : tuple of str
         Optional parameters that the scenes give.
     impact : bool
@@ -56,6 +62,10 @@ class Kind:
         Numbers that all cells share, by path.
     two_way : tuple of str
         Paths of the friction coefficients that depend on the direction of sliding.
+    load : bool
+        Whether the normal load varies in time.
+    frame : str
+        Frame of the zones of a belt.
     """
 
     model: str
@@ -70,6 +80,8 @@ class Kind:
     span: tuple[float, float] = (0.2, 3.0)
     fixed: Mapping[str, float] = field(default_factory=dict)
     two_way: tuple[str, ...] = ()
+    load: bool = False
+    frame: str = "belt"
 
     @property
     def scene(self) -> dict[str, Any]:
@@ -77,12 +89,16 @@ class Kind:
         found: dict[str, Any] = {"model": self.model, "friction": {"law": self.law}}
         if self.drive != "none":
             found["drive"] = {"law": self.drive}
-        if formula := {"clocked": CLOCKED, "two-tones": TWO_TONES}.get(self.drive):
+        if formula := FORMULAS.get(self.drive):
             found["drive"] = {"law": "formula", "theta": formula}
         if self.drive == "table":
             found["drive"] |= {"time": _TIMES.tolist(), "theta": _COURSE.tolist()}
-        if formula := {"clocked": CLOCKED, "two-tones": TWO_TONES}.get(self.force):
+        if formula := FORMULAS.get(self.force):
             found["force"] = {"formula": formula}
+        if self.load:
+            found["body"] = {"load": {"formula": CLOCKED}}
+        if self.frame != "belt":
+            found["friction"]["frame"] = self.frame
         if self.force == "table":
             found["force"] = {"time": _TIMES.tolist(), "force": (4.0 * _COURSE).tolist()}
         if self.arcs:
@@ -102,8 +118,10 @@ class Kind:
             impact=self.impact,
             own_drive=drive_type(self.model, scene.get("drive", {})),
             own_force=force_type(scene.get("force")),
+            own_load=force_type(scene["body"]["load"], "body.load") if self.load else None,
             force=(_TIMES, _COURSE) if self.force == "table" else None,
             two_way=self.two_way,
+            frame=self.frame,
         )
         of_force = {"harmonic": ("amplitude", "frequency", "phase"), "constant": ("constant",)}.get(self.force, ())
         given = {*self.parts, *(f"force.{name}" for name in of_force)}
@@ -156,7 +174,8 @@ MAGNITUDES: dict[str, tuple[float, float]] = {
     r"body.normal_stiffness": (0.1, 3.0),
     r"belt drive.amplitude": (0.005, 0.5),
     r"belt.velocity": (0.01, 1.0),
-    r"belt drive.frequency|belt force.frequency": (0.1, 2.0),
+    r"belt (drive|force|body.load).frequency": (0.1, 2.0),
+    r"body.load.amplitude": (0.1, 3.0),
     r"force.(amplitude|constant)": (0.2, 8.0),
     r"belt.incline": (0.01, 1.0),
     r"initial.x|initial.velocity": (0.05, 1.0),
@@ -305,7 +324,7 @@ PARITY = {
     r"belt.(velocity|incline)|initial.(x|velocity|deflection|phi|omega)": -1,
     r"center|(drive|force).(amplitude|constant)": -1,
     r"body.normal_stiffness|stops.(low|high)": -1,
-    r"spring.cubic|phase|body.center_offset|shift|frequency": 1,
+    r"spring.cubic|phase|body.center_offset|shift|frequency|body.load.amplitude": 1,
 }
 
 #: Outcomes that change their sign; extremes change places besides.
@@ -357,9 +376,9 @@ def mirror_of(ds: xr.Dataset) -> xr.Dataset:
 
 
 def later(run: Run, turns: int) -> Run:
-    """The same cells, launched so many periods of the forcing later: of the force and of the drive, each of its own."""
+    """The same cells, launched so many periods of the forcing later: of force, drive and load, each of its own."""
     numbers = dict(run.numbers)
-    for part in ("drive", "force"):
+    for part in ("drive", "force", "body.load"):
         if f"{part}.shift" in numbers:
             numbers[f"{part}.shift"] = numbers[f"{part}.shift"] + turns / numbers[f"{part}.frequency"]
         elif f"{part}.phase" in numbers:

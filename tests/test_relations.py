@@ -64,6 +64,22 @@ KINDS = {
     "belt-two-way-band": Kind("belt", "karnopp", force="harmonic", span=(2, 20), two_way=BOTH),
     "belt-zones": Kind("belt", "stiction", force="harmonic", parts=("belt.period",), arcs=2, span=(2, 20)),
     "belt-zones-smooth": Kind("belt", "bengisu-akay", force="harmonic", parts=("belt.period",), arcs=1, span=(2, 20)),
+    "belt-space-load": Kind(
+        "belt", "stiction", force="square", parts=SPRING + SLOPE, arcs=2, span=(2, 20), load=True, frame="space"
+    ),
+    "belt-zones-jumps": Kind(
+        *("belt", "tustin", "bouncing", 1, "square", (*LOADS[:2], "belt.period")), span=(2, 20), fixed=IN_STEP, load=True
+    ),
+    "belt-jumps-smooth": Kind(
+        "belt", "bengisu-akay", "bouncing", force="square", parts=SLOPE, span=(1, 8), two_way=BOTH, load=True
+    ),
+    "belt-stops-jumps": Kind(
+        "belt", "stiction", "bouncing", force="square", parts=LOADS[:2], impact=True, span=(2, 20), two_way=BOTH
+    ),
+    "belt-load-exponent": Kind(
+        "belt", "hyperbolic", force="harmonic", parts=SLOPE, span=(2, 20), record={"exponent": True}, load=True
+    ),
+    "belt-ruina": Kind("belt", "ruina", "sinusoidal", parts=SLOPE, span=(1, 8), load=True),
     "belt-dieterich": Kind("belt", "dieterich", force="harmonic", parts=("initial.contact_age",), span=(1, 8)),
     "belt-stops": Kind("belt", "stiction", force="harmonic", parts=SPRING, impact=True, span=(2, 20)),
     "belt-stops-smooth": Kind("belt", "bengisu-akay", force="harmonic", parts=LOADS, impact=True, span=(2, 20)),
