@@ -68,7 +68,7 @@ KINDS = {
         "belt", "stiction", force="square", parts=SPRING + SLOPE, arcs=2, span=(2, 20), load=True, frame="space"
     ),
     "belt-zones-jumps": Kind(
-        *("belt", "tustin", "bouncing", 1, "square", (*LOADS[:2], "belt.period")), span=(2, 20), fixed=IN_STEP, load=True
+        *("belt", "tustin", "bouncing", 1, "square", (*LOADS[:2], "belt.period")), span=(2, 9), fixed=IN_STEP, load=True
     ),
     "belt-jumps-smooth": Kind(
         "belt", "bengisu-akay", "bouncing", force="square", parts=SLOPE, span=(1, 8), two_way=BOTH, load=True
