@@ -117,7 +117,7 @@ class TestClosedForms:
         assert (found.certified == 1).all()
 
     @pytest.mark.slow
-    def test_a_patch_between_two_stops_takes_the_same_energy_in_each_passage(self):
+    def test_a_patch_between_stops_takes_the_same_energy_in_each_passage(self):
         """On a floor without friction elsewhere: each passage takes mu g L, each impact a share 1 - e^2."""
         mu, length, e, square = 0.05, 0.2, 0.9, 4.0
         scene = between(-0.5, 0.5, e, stiffness=0.0, velocity=0.0, start=(-0.4, sqrt(square)), span=20.0)

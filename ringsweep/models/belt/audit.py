@@ -113,7 +113,7 @@ def _undecided_on_belt(batch, one, other, fall_rates):
 
 
 @audit.of_events.implements(Belt, BristleBelt)
-def _of_impacts(batch, one):
+def _of_impacts_at_stops(batch, one):
     """Implement :func:`audit.of_events`: rebounds are summed."""
     hit = one.impacts > 0.0 if batch.stops else np.zeros(len(batch.span), dtype=bool)
     return hit & False, hit, SUMMED * hit
