@@ -32,6 +32,9 @@ _SPACINGS = ("linspace", "geomspace")
 # Cells that are checked at once: many zones over many points must not fill the memory.
 _CELLS_AT_ONCE = 4096
 
+#: Dimensions of a swept path, and its values: numbers in SI units or names of friction laws, in the shape of these.
+Column = tuple[tuple[str, ...], NDArray[Any]]
+
 #: Index of each of some cells along each dimension, by name of the dimension.
 Indices = Mapping[str, NDArray[np.intp]]
 
@@ -54,7 +57,7 @@ class Axes:
     """
 
     sizes: dict[str, int] = field(default_factory=dict)
-    columns: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = field(default_factory=dict)
+    columns: dict[str, Column] = field(default_factory=dict)
 
 
 def sweep_section(doc: Document) -> dict[str, Any]:
@@ -125,9 +128,7 @@ def dimension(path: str) -> str:
     return path.replace(".", "_")
 
 
-def read_data_array(
-    given: xr.DataArray, parameter: Parameter | Choice, where: str
-) -> tuple[tuple[str, ...], NDArray[Any]]:
+def read_data_array(given: xr.DataArray, parameter: Parameter | Choice, where: str) -> Column:
     """Dimensions and values of a DataArray, converted from its ``units``, or from those of pint's quantities in it."""
     dims = tuple(map(str, given.dims))
     if not dims:

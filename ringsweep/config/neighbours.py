@@ -183,7 +183,6 @@ def check_continues(structure: Structure, where: str) -> None:
     if structure.own_drive is not None or structure.drive not in _WITH_PHASE:
         raise InputError(where, f"drive law {structure.drive} has no phase to go on from: sinusoidal has one")
     if structure.own_force is not None or structure.force is not None:
-        what = "a table" if structure.own_force is None else "a formula"
-        raise InputError(where, f"a force by {what} has no phase to go on from: one with a frequency has")
+        raise InputError(where, "a force by a table or a formula has no phase to go on from: one with a frequency has")
     if structure.own_load is not None or structure.load is not None:
         raise InputError(where, "a load that varies in time has no phase to go on from: leave body.load out")

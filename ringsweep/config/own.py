@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsweep.config.sections import Key, Keys, choose, one_of, read_keys, read_values, section_of
 from ringsweep.config.yaml_text import Document
@@ -26,6 +25,7 @@ from ringsweep.physics.friction.formula import FRICTION, FormulaError
 from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.quantities.parameters import Choice, Parameter, declared
 from ringsweep.quantities.units import show
+from ringsweep.statistics import Floats
 
 #: Name of the law that the section ``friction`` defines by ``mu`` and ``at_rest``, and of the drive by ``theta``.
 FORMULA = "formula"
@@ -203,9 +203,8 @@ def force_type(force: Any, section: str = "force") -> type | None:
     for key in TABLE_KEYS[section]:
         if key in force:
             raise InputError(f"scene.{section}.{key}", "cannot stand beside a formula: give one of them")
-    return _defined(
-        lambda: drives.define(force["formula"], "N"), {"mu": (f"scene.{section}.formula", force["formula"])}
-    )
+    formula = force["formula"]
+    return _defined(lambda: drives.define(formula, "N"), {"mu": (f"scene.{section}.formula", formula)})
 
 
 def _law(definition: Definition, path: str) -> type:
@@ -262,9 +261,7 @@ _PLURAL = {"time": "times", "theta": "angles", "force": "forces", "load": "loads
 _ROOM = 1e100
 
 
-def read_samples(
-    doc: Document, given: dict[str, Any], section: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+def read_samples(doc: Document, given: dict[str, Any], section: str) -> tuple[Floats, Floats, str]:
     """Times, samples and interpolation of a drive or a force from a table; see :func:`read_table`."""
     known, where = INTERPOLATIONS[section], f"scene.{section}.interpolate"
     problem = f"is no interpolation of a {section}"
@@ -272,9 +269,7 @@ def read_samples(
     return *read_table(doc, given, section, 4 if interpolate == "spline" else 2), interpolate
 
 
-def read_table(
-    doc: Document, given: dict[str, Any], section: str, least: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def read_table(doc: Document, given: dict[str, Any], section: str, least: int) -> tuple[Floats, Floats]:
     """Both columns of a table. If they come from a file, they replace its name in the configuration.
 
     Parameters

@@ -331,9 +331,7 @@ class _Keys:
         for key, value in items:
             # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
             if str(key) not in children:
-                raise InputError(
-                    f"{where}.{key}".rstrip("."), f"unknown key{self.hint(path.rstrip('.'), str(key), laws)}"
-                )
+                raise InputError(f"{where}.{key}".rstrip("."), f"unknown key{self.hint(section, str(key), laws)}")
             if path + str(key) in self.known:
                 yield f"{path}{key}", value
             else:

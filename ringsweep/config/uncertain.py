@@ -154,14 +154,12 @@ class Sample:
         columns = dict(axes.columns)
         for factor, u in zip(self.factors, shares.T, strict=True):
             for path, drawn in factor.draw(u).items():
-                if factor.over is None:
-                    columns[path] = ("sample",), drawn
-                    continue
-                dims, base = columns.get(factor.over, ((), np.array(scene.values.get(factor.over, np.nan))))
-                if "sample" in dims:
-                    columns[path] = dims, base * drawn
-                else:
-                    columns[path] = (*dims, "sample"), base[..., None] * drawn
+                # What is no ratio is one to 1.
+                over = factor.over or ""
+                dims, base = columns.get(over, ((), np.array(scene.values.get(over, 1.0))))
+                if "sample" not in dims:
+                    dims, base = (*dims, "sample"), base[..., None]
+                columns[path] = dims, base * drawn
         return Axes({**axes.sizes, "sample": len(shares)}, columns)
 
 

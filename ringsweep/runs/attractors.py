@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import POINTS, words
-
-Floats = NDArray[np.float64]
+from ringsweep.statistics import Floats
 
 #: Long runs and regimes whose motion is a point: then the section is not looked at.
 _STILL = ("rest", "steady")

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors
 from ringsweep.config import Config, as_named, load, sweepable, with_values
@@ -26,15 +25,13 @@ from ringsweep.quantities.variables import HISTORY, configuration_of
 from ringsweep.runs.boundaries import run_points
 from ringsweep.runs.executors import interruptible
 from ringsweep.runs.thresholds import interval
-from ringsweep.statistics import unit_points
+from ringsweep.statistics import Floats, unit_points
 from ringsweep.storage.provenance import attributes
 
 if TYPE_CHECKING:
     from lmfit.model import ModelResult
 
 logger = logging.getLogger("ringsweep")
-
-Floats = NDArray[np.float64]
 
 # Points at which the misfit is tried, for each start that is chosen among them.
 _TRIED = 64
