@@ -66,20 +66,13 @@ def schema() -> dict[str, Any]:
             **leaves,
         }
     )
-    scene["required"] = ["model"]
-    scene["properties"]["drive"]["required"] = ["law"]
-    for section, what in {"friction": "friction law", "drive": "drive", "force": "force"}.items():
-        own_parameter = Parameter("", f"parameter of a {what} by formula")
-        scene["properties"][section]["additionalProperties"] = _number(own_parameter)
-    load = scene["properties"]["body"]["properties"]["load"]
-    load["additionalProperties"] = _number(Parameter("", "parameter of a load by formula"))
+    parts = scene["properties"] | scene["properties"]["body"]["properties"]
+    scene["required"], parts["drive"]["required"] = ["model"], ["law"]
+    for section, what in {"friction": "friction law", "drive": "drive", "force": "force", "load": "load"}.items():
+        parts[section]["additionalProperties"] = _number(Parameter("", f"parameter of a {what} by formula"))
     record = _section(_keys(options.RECORD, section=_section(_keys(options.SECTION), "at")))
-    sections = {
-        "scene": scene,
-        "solver": _solver(),
-        "record": {"description": "what a run records", **record},
-        "sweep": _sweep(list(known)),
-    }
+    record = {"description": "what a run records", **record}
+    sections = {"scene": scene, "solver": _solver(), "record": record, "sweep": _sweep(list(known))}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "ringsweep configuration"}
     return head | _section(sections, "scene")
 

@@ -252,10 +252,8 @@ def _of_sample(result: xr.Dataset) -> dict[str, list[str]]:
             lines.append(f"  {word}: {share.item():.2%} ({low.item():.2%} to {high.item():.2%}{part})")
             lines += _indices(of.squeeze(grid))
         elif share.max() > 0.0:
-            lines.append(
-                f"  {word}: {share.min():.2%} to {share.max():.2%}, mean {share.mean():.2%}; "
-                f"intervals up to {(high - low).max():.2%} long{part}"
-            )
+            shares = f"{share.min():.2%} to {share.max():.2%}, mean {share.mean():.2%}"
+            lines.append(f"  {word}: {shares}; intervals up to {(high - low).max():.2%} long{part}")
     runs = result["runs"]
     certified = float(runs.isel(certificate=1).sum() / runs.sum())
     return {"regimes": lines, "certificates": [f"certified: {_share_at_most(certified)} of {int(runs.sum())} runs"]}
