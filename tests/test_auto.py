@@ -10,16 +10,7 @@ from solutions import Fall, solve
 
 from ringsweep.compile import take
 from ringsweep.models.ring.record import Outcome
-from ringsweep.quantities.flags import (
-    COARSE,
-    FAILED,
-    NO_RESULT,
-    NOT_ASKED,
-    OSCILLATORY,
-    RESTING,
-    REVOLVING,
-    SEPARATING,
-)
+from ringsweep.quantities.flags import COARSE, FAILED, NO_RESULT, NOT_ASKED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers import event
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.certificate import with_errors

@@ -135,11 +135,7 @@ class TestBoundary:
         ("regime", "tolerance", "problem"),
         [
             ("seperating", 1e-3, r"regime: .*not a regime; did you mean `separating`\?"),
-            (
-                "stick-slip",
-                1e-3,
-                "regime: 'stick-slip' is not a regime of this scene .*known: resting, .*, failed",
-            ),
+            ("stick-slip", 1e-3, "regime: 'stick-slip' is not a regime of this scene .*known: resting, .*, failed"),
             ("separating", 0.0, "tolerance: "),
             ("separating", True, "tolerance: "),
             ("separating", "narrow", "tolerance: "),

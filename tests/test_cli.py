@@ -67,10 +67,7 @@ REFUSED = [
     ("run case.yaml --set velocity=2", "scene.velocity: unknown key; did you mean `drive.velocity`?"),
     ("run case.yaml --set spring.stiffness=2", "unknown key: model belt has `spring`, this is model ring"),
     ("run case.yaml --set body.mas=1", "--set body.mas=1: scene.body.mas: unknown key; did you mean `mass`?"),
-    (
-        "run case.yaml --dry-run --json",
-        "--dry-run: measures threads of this machine, and prints text: leave ",
-    ),
+    ("run case.yaml --dry-run --json", "--dry-run: measures threads of this machine, and prints text: leave "),
     ("run case.yaml --set mass=2", "scene.mass: unknown key; did you mean `body.mass`?"),
     ("run case.yaml --set friction.rough.mu=2", "scene.friction.rough.mu: unknown key; did you mean `mu_"),
     ("run case.yaml --set 'zone.half_angle=40 mm'", "the angle of an arc is its length divided by the radius"),

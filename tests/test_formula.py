@@ -26,13 +26,7 @@ from ringsweep.errors import InputError
 from ringsweep.numerics.expressions import derivative, evaluate
 from ringsweep.physics.friction.formula import FormulaError, read_formula
 from ringsweep.physics.friction.laws import Definition, define
-from ringsweep.physics.friction.velocity import (
-    EXPRESSIONS,
-    friction_at,
-    region_at,
-    region_bounds,
-    stiction_band,
-)
+from ringsweep.physics.friction.velocity import EXPRESSIONS, friction_at, region_at, region_bounds, stiction_band
 from ringsweep.quantities.flags import FAILED
 
 LEINE = {"law": "formula", "mu": "mu_s/(1 + delta*v)", "at_rest": "mu_s", "mu_s": 1.0, "delta": "3 s/m"}

@@ -268,10 +268,7 @@ class TestSwitches:
             (by("piecewise(t < t1, a*t, 3*a*t/2)", a=2.0, t1=1.0), "the angle jumps from 2 rad to 3 rad at t = 1 s"),
             (by("A*sign(cos(w*t))", A=2.0, w=2.0), "the angle jumps from 2 rad to -2 rad at t = 0.785398 s"),
             (by("A*(t/T - floor(t/T))", A=2.0, T=0.9), "the angle jumps from 2 rad to 0 rad at t = 0.9 s"),
-            (
-                by("A*max(sin(w*t), t/T)", A=2.0, w=5e4, T=9.0),
-                "the times of its switches are not found: within",
-            ),
+            (by("A*max(sin(w*t), t/T)", A=2.0, w=5e4, T=9.0), "the times of its switches are not found: within"),
             (by("A*floor(2*sin(w*t))", A=2.0, w=1.0), "floor takes a straight line in t, such as floor(t/T)"),
             (by("A*t*floor(A/A)", A=2.0), "floor of an expression without t: write the number itself"),
             (by("A*t**1.5", A=2.0), "its first derivative is no finite number at t = 0 s"),

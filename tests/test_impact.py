@@ -506,10 +506,7 @@ KNOWN = {
         {"regime": "separating", "separating_contact": 1, "t_end": near(0.126876351, 1e-8)}
         | {"t_separation": near(0.126876351, 1e-8), "flight_time": 0.0},
     ),
-    "greatest impulse": (
-        middle_of_impulses(1.0),
-        {"certified": 1, "impulse_max": near(0.0469470, 1e-7)},
-    ),
+    "greatest impulse": (middle_of_impulses(1.0), {"certified": 1, "impulse_max": near(0.0469470, 1e-7)}),
     "greatest impulse, mirrored": (middle_of_impulses(-1.0), {"certified": 1, "impulse_max": near(0.0469470, 1e-7)}),
 }
 

@@ -15,15 +15,7 @@ import ringsweep
 from ringsweep.compile import kernel, take
 from ringsweep.models import MODELS
 from ringsweep.models.parts import exceeds, larger_eigenvalue
-from ringsweep.numerics.functions import (
-    any_of,
-    decay,
-    floor,
-    opposing,
-    select,
-    sine_cosine,
-    sine_cosine_carried,
-)
+from ringsweep.numerics.functions import any_of, decay, floor, opposing, select, sine_cosine, sine_cosine_carried
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import conform, read_lanes, side_by_side, write
 from ringsweep.physics.friction import LAWS, Dynamic, family_of

@@ -123,7 +123,7 @@ def test_reactions_on_springs_grow_without_bound_where_det_A_is_negative():
     [(0.118, 0.84, 0.753, (2.222, 0.174), 0.51), (0.116, 0.724, 0.626, (2.48, 0.488), 0.59)],
 )
 def test_body_sticks_on_where_the_determinant_vanishes(angle, offset, inertia, mu_s, tilt):
-    """A narrow body is tilted until a contact opens; det A vanishes on the way. A body on springs does the same."""
+    """A narrow body is tilted until a contact opens; det A vanishes on the way."""
     M, R, g, frequency = 0.1, 0.05, 9.81, 0.05
     xi = offset * R * np.cos(angle)
     body = rod(M, inertia * M * R**2, R, xi, np.sin(angle), np.cos(angle), g)

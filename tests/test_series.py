@@ -8,17 +8,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from ringsweep.compile import inlined, kernel
-from ringsweep.numerics.series import (
-    ORDER,
-    STACK,
-    ascending,
-    crossings,
-    first_root,
-    slope,
-    step_size,
-    value,
-    variation,
-)
+from ringsweep.numerics.series import ORDER, STACK, ascending, crossings, first_root, slope, step_size, value, variation
 from ringsweep.numerics.swing import swing
 from ringsweep.numerics.terms import COLUMNS, FACTOR_ROWS, PRODUCTS, inner_products, no_factors, set_factors
 

@@ -64,11 +64,7 @@ class TestBalance:
     @pytest.mark.slow
     @pytest.mark.parametrize(
         ("law", "solver"),
-        [
-            (TUSTIN, "event"),
-            (TUSTIN, {"method": "rk4", "steps": 2000}),
-            ({"law": "lugre", **BRISTLES}, "auto"),
-        ],
+        [(TUSTIN, "event"), (TUSTIN, {"method": "rk4", "steps": 2000}), ({"law": "lugre", **BRISTLES}, "auto")],
     )
     def test_damped_body_stays_and_is_said_to_slide(self, law, solver):
         run = ringsweep.simulate(
@@ -123,10 +119,7 @@ class TestHopfBifurcation:
         ({"initial": {"steady": "stick"}}, r"initial\.steady: 'stick' is no steady motion \(known: slip\)"),
         ({"initial": {"steady": "slip", "x": 0.1}}, r"initial\.x: cannot stand beside initial\.steady"),
         ({"initial": {"steady": "slip", "velocity": 0.1}}, r"initial\.velocity: cannot stand beside initial\.steady"),
-        (
-            {"initial": {"steady": "slip", "contact_age": 1}},
-            r"initial\.contact_age: cannot stand beside",
-        ),
+        ({"initial": {"steady": "slip", "contact_age": 1}}, r"initial\.contact_age: cannot stand beside"),
         ({"body": {"mass": 1.0, "load": {"formula": "A*sin(w*t)", "A": 1, "w": 1}}}, "a normal load that does not"),
         ({"spring": {"stiffness": 0.0}}, r"initial\.steady: .*the spring cannot hold the body against 2\.943 N"),
         ({"spring": {"stiffness": 20.0, "cubic": -1e5}}, r"initial\.steady: .*cannot hold the body"),
@@ -136,10 +129,7 @@ class TestHopfBifurcation:
             "needs a belt of constant velocity",
         ),
         ({"friction": {"law": "karnopp", "mu_s": 0.5, "mu_k": 0.3, "dead_band": 0.2}}, "a belt at 0.2 m/s does not"),
-        (
-            {"friction": {"law": "bristle", "mu_k": 0.3, "sigma0": 1e4}},
-            "bristles of friction law bristle have no st",
-        ),
+        ({"friction": {"law": "bristle", "mu_k": 0.3, "sigma0": 1e4}}, "bristles of friction law bristle have no st"),
     ],
 )
 def test_scene_without_steady_slip_is_refused_by_its_path(change, message):
