@@ -105,6 +105,13 @@ def growth(ends, state, weight, periods, distance):
     return np.array(found)
 
 
+def period_map(ends, state, distance):
+    """Matrix of the derivative of the map of one period at a state, by differences; `ends` as in :func:`growth`."""
+    steps = distance * np.eye(len(state))
+    one, other = np.split(ends(np.reshape(state, (-1, 1)) + np.hstack([steps, -steps])), 2, axis=1)
+    return (one - other) / (2.0 * distance)
+
+
 HISTORY = ("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode")
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from belts import on_belt, with_all_parts, with_exponent
-from scipy.integrate import solve_ivp
-from solutions import growth
+from solutions import growth, period_map
 
 import ringsweep
 
@@ -139,44 +139,25 @@ def test_steady_sliding_loses_its_stability_at_half_the_logarithm_of_ten():
 
 @pytest.mark.slow
 def test_multipliers_with_bristles_that_let_go():
-    """The reset integrator jumps at breakaway and at each reversal. SciPy finds the derivative of its period map."""
-    v_belt, force, frequency, damping, stiffness, damping_z, mu_s, mu_k = 0.2, 0.3, 0.8, 0.05, 5.0, 0.4, 0.35, 0.25
-    period = 2.0 * np.pi / frequency
-    law = {"law": "reset-integrator", "mu_s": mu_s, "mu_k": mu_k, "sigma0": stiffness, "sigma1": damping_z}
-    scene = on_belt(law, damping=damping, velocity=v_belt, gravity=1.0, span=150 * period)
-    scene |= {"force": {"amplitude": force, "frequency": frequency / (2.0 * np.pi)}, "initial": {"x": 0.1}}
+    """The reset integrator jumps at breakaway and at each reversal."""
+    law = {"law": "reset-integrator", "mu_s": 0.35, "mu_k": 0.25, "sigma0": 5.0, "sigma1": 0.4}
+    scene = on_belt(
+        law, damping=0.05, velocity=0.2, gravity=1.0, force=(0.3, 0.125, "90 deg"), start=(0.1,), span=1200.0
+    )
     found = run(scene, certify=True)
 
-    def after(state, sign, periods=1):
-        """State, and direction of slip (0 in stick), after some periods."""
-        t, end = 0.0, periods * period
-        while t < end * (1.0 - 1e-14):
+    def ends(spans, **initial):
+        points = {"time.span": spans} | {f"initial.{name}": values for name, values in initial.items()}
+        axes = {path: xr.DataArray(values, dims="run") for path, values in points.items()}
+        tight = {"method": "implicit", "rtol": 1e-11, "certify": False}
+        last = ringsweep.sweep(with_all_parts(scene), axes, solver=tight, progress=False)
+        return np.array([last.x_end, last.velocity_end, last.deflection_end])
 
-            def rates(t, y, sign=sign):
-                x, v, z = y
-                traction = sign * mu_k if sign else stiffness * z + damping_z * v
-                net = force * np.cos(frequency * t) - x - damping * (v + v_belt) - traction
-                return [v + v_belt, net, 0.0 if sign else v]
+    def one_period(at):
+        return ends(np.full(6, 8.0), x=at[0], velocity=at[1], deflection=at[2])
 
-            def lets_go(t, y):
-                return mu_s / stiffness - abs(y[2])
-
-            def reverses(t, y, sign=sign):
-                return sign * y[1]
-
-            event = reverses if sign else lets_go
-            event.terminal, event.direction = True, -1
-            part = solve_ivp(rates, (t, end), state, "DOP853", events=event, rtol=1e-12, atol=1e-14)
-            t, state = part.t[-1], part.y[:, -1]
-            if part.status == 1:
-                sign = 0 if sign else int(np.sign(state[2]))
-                state[2] = sign * mu_s / stiffness if sign else state[2]
-        return state, sign
-
-    state, sign = after(np.array([0.1, 0.0, 0.0]), 0, 60)
-    steps = 1e-6 * np.eye(3)
-    map_derivative = np.array([(after(state + d, sign)[0] - after(state - d, sign)[0]) / 2e-6 for d in steps]).T
-    first, second, third = np.sort(np.abs(np.linalg.eigvals(map_derivative)))[::-1]
+    multipliers = np.linalg.eigvals(period_map(one_period, ends([480.0]), 1e-5))
+    first, second, third = np.sort(np.abs(multipliers))[::-1]
     assert found.certified.item() == 1
     assert found.multiplier_1.item() == pytest.approx(first, rel=1e-5)
     assert found.multiplier_2.item() == pytest.approx(second, rel=1e-5)

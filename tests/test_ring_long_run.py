@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from rings import course, particle, rubs, shape
-from solutions import growth
+from solutions import growth, period_map
 
 import ringsweep
 from ringsweep import cli
@@ -61,14 +61,6 @@ def test_points_are_states_at_whole_periods():
     np.testing.assert_allclose(found.omega_section, omega, atol=1e-7)
 
 
-def period_map(scene):
-    """Matrix of the derivative of the map of one period, after 40 periods, by differences."""
-    states = ends(scene, [40.0]) + 1e-6 * np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
-    phi, omega = states
-    after = ends(scene, np.ones(4), phi=phi, omega=omega)
-    return (after[:, ::2] - after[:, 1::2]) / 2e-6
-
-
 @pytest.mark.parametrize("rtol", [1e-10, 1e-12, 1e-14])
 @pytest.mark.parametrize(("amplitude", "sticks"), [(1.0, True), (2.0, False)])
 def test_multipliers_are_those_of_the_period_map(amplitude, sticks, rtol):
@@ -78,7 +70,9 @@ def test_multipliers_are_those_of_the_period_map(amplitude, sticks, rtol):
     assert word(found) == "periodic"
     assert found.period.item() == pytest.approx(1.0, rel=1e-12)
     assert (found.stick_time.item() > 1.0) == sticks
-    exact = np.linalg.eigvals(period_map(ROCKING | {"drive": drive}))
+    scene = ROCKING | {"drive": drive}
+    map_derivative = period_map(lambda at: ends(scene, np.ones(4), phi=at[0], omega=at[1]), ends(scene, [40.0]), 1e-6)
+    exact = np.linalg.eigvals(map_derivative)
     values = np.sort(np.abs(exact))
     assert found.multiplier_1.item() == pytest.approx(values[1], rel=1e-6)
     assert found.multiplier_2.item() == pytest.approx(values[0], rel=1e-6, abs=1e-6)
