@@ -171,20 +171,6 @@ class TestBranchesOfTheFrictionOscillator:
         scene = {"initial": initial, "time": {"span": 2000.0}}
         return belt(1.0, scene=scene, record={"exponent": True}, sweep=sweep)
 
-    def test_steady_slip_turns_unstable_where_damping_cancels_falling_friction(self):
-        """Hopf bifurcation: c = N (mu_s - mu_k) alpha exp(-alpha v), so v = ln(10) / 2."""
-        velocities = np.linspace(1.1, 1.2, 11)
-        ds = self.follow(velocities, "down", x=0.55, velocity=0.0)
-        exact = 0.5 * np.log(10.0)
-        # The exponent of steady slip is (exp(-2 v) - c) / 2. Farther below, the run arrives on the cycle.
-        near = abs(velocities - exact) < 0.02
-        np.testing.assert_allclose(ds.lyapunov.values[near], 0.5 * np.exp(-2.0 * velocities[near]) - 0.05, atol=2e-5)
-        grows = np.flatnonzero(ds.lyapunov.values > 0.0).max()
-        zero = np.interp(0.0, ds.lyapunov.values[[grows + 1, grows]], velocities[[grows + 1, grows]])
-        assert zero == pytest.approx(exact, abs=1e-4)
-        # Far below the body is on the cycle.
-        assert ringsweep.words(ds.regime).values[0] == "stick-slip"
-
     def test_the_cycle_ends_where_it_has_been_published(self):
         """1.83660: beyond, no launch from stick sticks again."""
         velocities = 1.8366 + np.arange(-10, 11) * 2e-5

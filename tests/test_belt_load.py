@@ -128,21 +128,6 @@ class TestSeparation:
         assert word(found) == "separating"
         assert float(found.t_end) == 0.0
 
-    def test_smooth_friction_of_a_load_without_gravity_on_a_belt_at_rest(self):
-        """Neither a weight nor a motion of the belt gives a size of the errors."""
-        v0 = 1e-3
-        found = outcome(
-            scene("tanh", start=(0.0, 0.5), v_b=0.0, span=1.5)
-            | {"gravity": 0.0, "spring": {"stiffness": 1.0}, "friction": {"law": "tanh", "mu_k": 0.25, "v0": v0}}
-        )
-
-        def rates(_, y):
-            return y[1], -(y[0] + 0.25 * 8.0 * y[0] * np.tanh(y[1] / v0)) / M
-
-        exact = solve_ivp(rates, (0.0, 1.5), (0.0, 0.5), "Radau", rtol=1e-10, atol=1e-12).y[:, -1]
-        assert found.certified == 1
-        assert [float(found.x_end), float(found.velocity_end)] == pytest.approx(exact, abs=1e-8)
-
     def test_bristles_bear_a_load_that_grows_from_nothing(self):
         start = (-1.25, 0.5)
         found = scene("dahl", start=start, span=0.5) | {"gravity": 10.0, "body": {"mass": 1.0, "normal_stiffness": 8.0}}

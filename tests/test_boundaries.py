@@ -188,26 +188,23 @@ class TestDrawnCurves:
         (line,) = plots.regime_map(ds, boundaries=curves, x="drive_amplitude", y="mass").axes[0].lines
         return line.get_xydata().tolist()
 
-    def test_curve_around_an_island_is_closed(self):
-        inside = np.zeros((5, 5), dtype=bool)
-        inside[2, 2] = True
-        drawn = self.drawn(inside, (3.0, 2.4, 0), (2.4, 3.0, 1), (3.0, 3.6, 0), (3.6, 3.0, 1))
-        assert drawn[0] == drawn[-1]
-        assert len(drawn) == 5
-
-    def test_curve_that_leaves_the_map_is_drawn_up_to_the_frame(self):
-        inside = np.zeros((5, 5), dtype=bool)
-        inside[:2, 2] = True
-        drawn = self.drawn(inside, (2.4, 1.0, 1), (2.4, 2.0, 1), (3.0, 2.6, 0), (3.6, 2.0, 1), (3.6, 1.0, 1))
-        assert drawn[0] == [2.4, 0.5]
-        assert drawn[-1] == [3.6, 0.5]
-        assert len(drawn) == 7
-
-    def test_curve_that_uncertified_cells_interrupt_stays_open(self):
-        inside = np.zeros((7, 7), dtype=bool)
-        inside[2:5, 2:5] = True
-        drawn = self.drawn(inside, (3.0, 2.5, 0), (4.0, 2.5, 0), (5.0, 2.5, 0), (5.5, 3.0, 1), (5.5, 4.0, 1))
-        assert len(drawn) == 5
+    @pytest.mark.parametrize(
+        ("side", "cells", "points", "ends"),
+        [
+            # Around an island; out of the map, up to its frame; open where cells without a certificate interrupt it.
+            (5, np.s_[2, 2], [(3.0, 2.4, 0), (2.4, 3.0, 1), (3.0, 3.6, 0), (3.6, 3.0, 1)], [[3.0, 2.4]] * 2),
+            (5, np.s_[:2, 2], [(2.4, 1.0, 1), (2.4, 2.0, 1), (3.0, 2.6, 0), (3.6, 2.0, 1), (3.6, 1.0, 1)],
+             [[2.4, 0.5], [3.6, 0.5]]),
+            (7, np.s_[2:5, 2:5], [(3.0, 2.5, 0), (4.0, 2.5, 0), (5.0, 2.5, 0), (5.5, 3.0, 1), (5.5, 4.0, 1)],
+             [[3.0, 2.5], [5.5, 4.0]]),
+        ],
+    )  # fmt: skip
+    def test_curve_is_closed_or_ends_at_the_frame_or_where_it_is_unknown(self, side, cells, points, ends):
+        inside = np.zeros((side, side), dtype=bool)
+        inside[cells] = True
+        drawn = self.drawn(inside, *points)
+        assert [drawn[0], drawn[-1]] == ends
+        assert set(map(tuple, drawn)) == {point[:2] for point in points} | set(map(tuple, ends))
 
 
 class TestValueThatTheMapLacks:
