@@ -57,6 +57,9 @@ def test_multipliers_of_a_linear_oscillator():
     turned = np.angle(np.exp(5j * np.sqrt(1.0 - 0.05**2)))
     assert abs(turned) == pytest.approx(found.multiplier_angle_1.item(), rel=1e-10)
     assert found.multiplier_angle_2.item() == -found.multiplier_angle_1.item()
+    # A greater damper lets them creep back at two rates.
+    creeps = run(scene | {"damper": {"coefficient": 2.5}}, {"force.amplitude": [0.5], "force.frequency": [1.0]})
+    assert [creeps.multiplier_1.item(), creeps.multiplier_2.item()] == pytest.approx([np.exp(-0.5), np.exp(-2.0)])
 
 
 def test_exponent_of_the_oscillator_of_ueda():

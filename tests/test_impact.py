@@ -14,7 +14,7 @@ import ringsweep
 from ringsweep.errors import InputError
 from ringsweep.physics.impact import Balls, Contact, Motion, contact_of, impulses
 from ringsweep.quantities.flags import AFTERMATHS, SEPARATING
-from ringsweep.quantities.variables import INFERRED, LABELS
+from ringsweep.quantities.variables import INFERRED
 
 G, RADIUS = 9.81, 0.2
 
@@ -613,7 +613,7 @@ def test_refined_map_follows_the_words_of_aftermath_within_one_regime():
     assert set(np.unique(full_map.aftermath.values[lost])) == set(range(1, len(AFTERMATHS)))
     assert 0.2 < inferred.mean() < 0.8
     wrong = np.zeros(lost.shape, dtype=bool)
-    for name in LABELS:
+    for name in ("regime", "motion", "separating_contact", "aftermath"):
         assert ds[name].dtype == np.int8
         wrong |= ds[name].values != full_map[name].values
     assert wrong.sum() <= ds.attrs["audit_bound"] * inferred.sum()

@@ -71,7 +71,7 @@ def make_history(count: int = 2000, ring: bool = True) -> xr.Dataset:
 def make_work(methods: int = 3, settings: int = 4, cells: int = 5) -> xr.Dataset:
     """Errors of invented methods, which fall as run time grows."""
     k, j, i = np.meshgrid(range(methods), range(settings), range(cells), indexing="ij")
-    error = 10.0 ** (-1.0 - 2 * j - 0.1 * k) * (1 + i)
+    error = 10.0 ** (-1.0 - 2 * j - 0.1 * k) * (1 + i) ** 2
     return xr.Dataset(
         {
             "time_per_run": ("contender", 10.0 ** (0.3 * j + k - 6)[..., 0].ravel(), {"units": "s"}),

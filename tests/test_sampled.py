@@ -91,7 +91,7 @@ def test_a_distribution_has_its_mean_and_its_quantiles() -> None:
         "uniform": ((1.0, 3.0), 2.0, 2.0 / np.sqrt(12.0)),
         "lognormal": ((2.0, 0.5), 2.0, 0.5),
         "triangular": ((0.0, 1.0, 2.0), 1.0, np.sqrt(1.0 / 6.0)),
-        "truncnormal": ((0.0, 1.0, 0.0, 40.0), np.sqrt(2.0 / np.pi), np.sqrt(1.0 - 2.0 / np.pi)),
+        "truncnormal": ((1.0, 1.0, 1.0, 40.0), 1.0 + np.sqrt(2.0 / np.pi), np.sqrt(1.0 - 2.0 / np.pi)),
     }
     for name, (numbers, mean, deviation) in cases.items():
         values = distribution(name, *numbers).ppf(u)
