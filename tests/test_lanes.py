@@ -173,6 +173,7 @@ MILD = {
 def test_neighbours_of_a_run_change_no_bit_of_it(law):
     rng = np.random.default_rng(7)
     axes = {"belt.velocity": rng.uniform(-0.5, 0.5, 40), "spring.stiffness": rng.uniform(20.0, 60.0, 40)}
+    axes |= {"force.amplitude": rng.uniform(0.0, 5.0, 40), "force.frequency": rng.uniform(0.5, 2.0, 40)}
     scene = with_all_parts(on_belt({"law": law, "mu_s": 0.2, "mu_k": 0.1, **MILD[law]}, velocity=0.1, span=3.0))
 
     def ends(cells):
