@@ -47,9 +47,9 @@ def word(found, name="long_run"):
 
 def ends(scene, spans, **initial):
     """Place and velocity at the ends of runs over some spans, or from some places and velocities."""
-    axes = {"time.span": spans} | {f"initial.{name}": values for name, values in initial.items()}
-    points = {path: xr.DataArray(column, dims="run") for path, column in axes.items()}
-    found = ringsweep.sweep(scene, points, solver={"method": "event", "rtol": 1e-14, "certify": False}, progress=False)
+    points = {"time.span": spans} | {f"initial.{name}": values for name, values in initial.items()}
+    sweep = {"points": {path: np.asarray(column).tolist() for path, column in points.items()}}
+    found = run(scene, sweep=sweep, solver={"method": "event", "rtol": 1e-14, "certify": False})
     return np.array([found.phi_end, found.omega_end])
 
 
