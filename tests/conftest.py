@@ -179,9 +179,9 @@ def run() -> Callable[..., Any]:
 @pytest.fixture(scope="session")
 def history() -> Callable[..., Any]:
     """Function that returns the history of the first cell of a batch by RK4, one array for each variable."""
-    names = MODELS["ring"].history(Structure("ring", "bengisu-akay"))
 
-    def integrate(batch: Any, steps: int) -> Any:
+    def integrate(batch: Any, steps: int, law: str = "bengisu-akay") -> Any:
+        names = MODELS["ring"].history(Structure("ring", law))
         t, rows = RK4(steps).history(batch, steps, len(names))
         return SimpleNamespace(t=t, **dict(zip(names, rows.T, strict=True)))
 

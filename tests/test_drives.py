@@ -114,9 +114,6 @@ class TestArctan:
             assert shape(Arctan(1.0), t)[0] == pytest.approx(t * atan(t) - 0.5 * log(1 + t * t), abs=1e-15)
             assert shape(Arctan(1.0), t)[0] == pytest.approx(quad(atan, 0.0, t)[0], abs=1e-12)
 
-    def test_rate_of_arctan_is_the_arctangent(self):
-        assert shape(Arctan(1.0), 5.0)[1] == atan(5.0)
-
 
 class TestPowerAtTheStart:
     @pytest.mark.parametrize(

@@ -1,18 +1,13 @@
 """The ring under the Dahl law, against Coulomb friction and against its own balances."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from solutions import solve
 
 from ringsweep.compile import take
-from ringsweep.models import MODELS
-from ringsweep.models.scene import Structure
 from ringsweep.physics.friction.bristles import NEARLY
 from ringsweep.quantities.flags import JAMMED, OSCILLATORY, REVOLVING, SEPARATING
 from ringsweep.solvers.event import Event, Implicit
-from ringsweep.solvers.rk4 import RK4
 
 EXACT = Implicit(rtol=1e-9, certify=False)
 LIMIT = Event(rtol=1e-14, certify=False)
@@ -59,17 +54,10 @@ def rigid(cells):
     return build
 
 
-def history(batch, steps):
-    """History under RK4 at every step: ``t`` and one array for each history variable."""
-    names = MODELS["ring"].history(Structure("ring", "dahl"))
-    t, rows = RK4(steps).history(batch, steps, len(names))
-    return SimpleNamespace(t=t, **dict(zip(names, rows.T, strict=True)))
-
-
 @pytest.fixture
-def launched(dahl):
+def launched(dahl, history):
     batch = dahl(LAUNCH, MILD)
-    return take(batch, 0), history(batch, 100_000)
+    return take(batch, 0), history(batch, 100_000, "dahl")
 
 
 def order(x, error):
@@ -109,9 +97,9 @@ class TestMethods:
     """Methods agree at a stiffness that a constant step resolves."""
 
     @pytest.mark.parametrize("scene", [LAUNCH, {**DRIVEN_OFF, "time.span": 1.0}], ids=["launched", "driven"])
-    def test_implicit_and_rk4_agree(self, dahl, scene):
+    def test_implicit_and_rk4_agree(self, dahl, history, scene):
         batch = dahl(scene, MILD)
-        found, run = solve(EXACT, batch), history(batch, 200_000)
+        found, run = solve(EXACT, batch), history(batch, 200_000, "dahl")
         assert run.t[-1] == found.t_end
         assert found.phi_end == pytest.approx(run.phi[-1], abs=1e-6)
         assert found.phi_max == pytest.approx(run.phi.max(), abs=1e-6)

@@ -128,16 +128,6 @@ def test_before_a_jam_the_velocity_has_a_limit_and_reactions_have_none(cells):
     assert (abs(determinant) < 1e-12 * free_determinant(body)).all()
 
 
-@pytest.mark.parametrize("law", ["bengisu-akay", "tustin"])
-def test_alpha_zero_is_static_friction_at_all_speeds(cells, law):
-    changes = {"friction.alpha": 0.0, "drive.amplitude": 2.0, "time.span": 5.0}
-    changes |= {"friction.v0": 1e-6} if law == "bengisu-akay" else {}
-    level = {"friction.rough.mu_k": 0.5, "friction.rest.mu_k": 0.2}
-    found, twin = (solve(Auto(), cells(changes | more, law=law, drive="arctan")) for more in ({}, level))
-    assert found.regime == SEPARATING
-    assert found.t_separation == pytest.approx(twin.t_separation[0], abs=1e-8)
-
-
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4])
 def test_loose_tolerance_causes_no_false_separation(cells, rtol):
     """An inaccurate power series of a reaction has roots that the reaction does not have."""
