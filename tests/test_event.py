@@ -176,20 +176,6 @@ class TestStick:
         assert solve(Event(), stuck_to_the_end).stick_time == t - 1e-6
 
 
-class TestLimit:
-    def test_tustin_tends_to_stiction_as_its_tail_steepens(self, setting, cells, figure):
-        """The body leaves the tail exponentially, which takes a time proportional to log(alpha) / alpha."""
-        for number in (29, 30):
-            drive, changes, _ = figure(number)
-            alpha = 10.0 ** np.arange(3, 8)
-            changes = {path: value for path, value in changes.items() if path != "friction.v0"}
-            found = solve(EXACT, cells(changes | {"friction.alpha": alpha}, law="tustin", drive=drive))
-            error = abs(found.t_separation - solve(EXACT, setting(number, "stiction")).t_separation)
-            slope = np.polyfit(np.log(alpha), np.log(error / np.log(alpha)), 1)[0]
-            assert slope == pytest.approx(-1.0, abs=0.03)
-            assert error[-1] < 2e-6
-
-
 class TestEnds:
     def test_launch_jams_where_the_determinant_of_the_balances_is_not_positive(self, stiction):
         body = take(stiction({}).body, 0)

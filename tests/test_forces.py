@@ -1,6 +1,5 @@
 """A damper, a cubic spring and forces on the belt, against closed forms, published numbers and other integrators."""
 
-import json
 from math import asin, cos, pi, sin, sqrt
 from typing import ClassVar
 
@@ -484,19 +483,3 @@ class TestParts:
         for section in ("force", "damper"):
             with pytest.raises(InputError, match=f"scene.{section}: unknown key"):
                 ringsweep.simulate(scene | {section: {"constant": 1.0}})
-
-    @pytest.mark.slow
-    def test_force_from_a_file_is_stored_with_the_run_and_repeats_it(self, tmp_path):
-        times = np.linspace(0.0, 12.0, 25)
-        samples = np.sin(times)
-        rows = "\n".join(f"{t!r},{f!r}" for t, f in zip(times.tolist(), samples.tolist(), strict=True))
-        (tmp_path / "force.csv").write_text(f"t,force (kN)\n{rows}\n")
-        scene = self.plain(force={"file": str(tmp_path / "force.csv"), "amplitude": 1e-3}, damper={"coefficient": 0.1})
-        scene["spring"]["cubic"] = 0.0
-        listed = scene | {"force": {"time": times.tolist(), "force": samples.tolist()}}
-        first = ringsweep.run({"scene": scene}, tmp_path / "first.nc", progress=False)
-        (tmp_path / "force.csv").unlink()
-        again = ringsweep.run(tmp_path / "first.nc", tmp_path / "again.nc", progress=False)
-        assert float(first.x_end) == float(again.x_end)
-        assert float(first.x_end) == pytest.approx(float(ringsweep.simulate(listed).x_end), abs=1e-12)
-        assert "force" in json.loads(first.attrs["configuration"])["scene"]["force"]
