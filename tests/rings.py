@@ -1,5 +1,8 @@
 """Scenes of a body in a ring, each from one line of numbers (SI) for its shape, its friction and its course."""
 
+from copy import deepcopy
+from functools import reduce
+
 #: A configuration as it is typed: the scene of the paper's Fig. 29.
 TYPED = """\
 scene:
@@ -24,6 +27,19 @@ sweep:
     drive.amplitude: {geomspace: [0.1, 10, 5]}
     zone.half_angle: [2 deg, 0.5]
 """
+
+
+def edited(tree, **changes):
+    """A configuration with some paths (double underscores for dots) replaced; None removes a key."""
+    tree = deepcopy(tree)
+    for path, value in changes.items():
+        *parents, last = path.split("__")
+        node = reduce(lambda node, key: node.setdefault(key, {}), parents, tree)
+        node[last] = value
+        if value is None:
+            del node[last]
+    return tree
+
 
 #: Names of the numbers of a drive behind its amplitude.
 _NUMBERS = {"power": ("exponent",), "sinusoidal": ("frequency", "phase")}

@@ -1,8 +1,8 @@
 """Comparison of friction laws: an axis of a sweep, runs in one dataset, lines in one picture."""
 
-import copy
 import json
 import logging
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import xarray as xr
 import yaml
 from belts import on_belt
 from jsonschema import Draft202012Validator
+from rings import edited
 
 import ringsweep
 from ringsweep import plots
@@ -29,19 +30,7 @@ CONFIG = {
 }
 
 
-def changed(**changes):
-    """The configuration with changed paths, dots written as double underscores; None deletes a key."""
-    config = copy.deepcopy(CONFIG)
-    for path, value in changes.items():
-        *parents, last = path.split("__")
-        node = config
-        for key in parents:
-            node = node[key]
-        if value is None:
-            del node[last]
-        else:
-            node[last] = value
-    return config
+changed = partial(edited, CONFIG)
 
 
 def grid(**axes):

@@ -1,11 +1,10 @@
 """Reading of configurations, and the messages about errors in them."""
 
 import contextlib
-import copy
 import json
 import math
 import os
-from functools import reduce
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from threading import Thread
@@ -13,6 +12,7 @@ from threading import Thread
 import numpy as np
 import pint
 import pytest
+import rings
 import xarray as xr
 import yaml
 from hypothesis import HealthCheck, given, settings
@@ -39,16 +39,7 @@ SCENE = yaml.safe_load(TEXT)["scene"]
 SOLVER = {"method": "rk4", "steps": 1000}
 
 
-def edited(**changes):
-    """The scene with some paths (double underscores for dots) replaced; None removes a key."""
-    scene = copy.deepcopy(SCENE)
-    for path, value in changes.items():
-        *parents, last = path.split("__")
-        node = reduce(lambda node, key: node.setdefault(key, {}), parents, scene)
-        node[last] = value
-        if value is None:
-            del node[last]
-    return scene
+edited = partial(rings.edited, SCENE)
 
 
 def read_scene(scene):
