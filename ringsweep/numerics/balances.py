@@ -275,7 +275,8 @@ def _content(row: Mapping[Monomial, Polynomial]) -> Polynomial:
 
 def _text_of(monomial: Monomial, prefix: str = "") -> str:
     """Source text of a monomial; `prefix` stands before each name."""
-    return " * ".join(prefix + name for name, power in monomial for _ in range(power)) or "1.0"
+    dividend = " * ".join(prefix + name for name, power in monomial for _ in range(power)) or "1.0"
+    return dividend + "".join(f" / {prefix}{name}" for name, power in monomial for _ in range(-power))
 
 
 def evaluate(p: Mapping[Monomial, float], values: Any) -> Any:
