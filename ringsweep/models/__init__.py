@@ -9,6 +9,7 @@ import numpy as np
 from ringsweep.compile import lacking
 from ringsweep.models.belt import Belt, StopBelt
 from ringsweep.models.model import Model
+from ringsweep.models.pair import BeltPair
 from ringsweep.models.ring import Ring, RingImpact, SingleContactImpact, SingleContactRing
 from ringsweep.models.scene import Structure, Values
 from ringsweep.quantities.parameters import Parameter
@@ -43,7 +44,7 @@ def add_model(model: Model) -> None:
     MODELS[model.name] = model
 
 
-for _model in (Ring(), SingleContactRing(), Belt()):
+for _model in (Ring(), SingleContactRing(), Belt(), BeltPair()):
     add_model(_model)
 
 

@@ -105,7 +105,7 @@ class Model(ABC):
         Names of the outcomes, in the order in which ``recorder.conclude`` returns them. Each is a key of
         :data:`ringsweep.quantities.variables.OUTCOMES`.
     place : str
-        History variable for the place of the body. The outcome for the place at the end is this name with ``_end``.
+        History variable for the place of the body. The outcome for the place at the end is :attr:`place_end`.
     driven : tuple of str
         History variables for the place and the velocity of the ring or belt that the drive moves, if the methods do not
         give them. Without any there is no film of the model.
@@ -132,6 +132,11 @@ class Model(ABC):
     absent: ClassVar[frozenset[str]] = frozenset()
     has_exponent: ClassVar[bool] = False
     sections: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def place_end(self) -> str:
+        """Outcome for the place at the end: the name of the place with ``_end``."""
+        return f"{self.place}_end"
 
     @property
     def variables(self) -> dict[str, Variable]:

@@ -19,7 +19,7 @@ from ringsweep.plots.look import angle_unit
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.variables import HISTORY, MODES, configuration_of, swept, written
 
-#: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
+#: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt, ``x_1`` of two.
 #: Variables of one tuple share a panel.
 PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "phi": (
@@ -27,6 +27,7 @@ PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
         *(("gap_1", "gap_2"), ("impact_speed",)),
     ),
     "x": (("x",), ("velocity", "belt_velocity"), ("friction_force",)),
+    "x_1": (("x_1", "x_2"), ("velocity_1", "velocity_2"), ("friction_force_1", "friction_force_2")),
 }
 
 #: What pictures show in place of the mode of friction while one of two contacts is open, and while none holds.
@@ -177,7 +178,7 @@ def panels_of(ds: xr.Dataset) -> list[tuple[str, ...]]:
     InputError
         If the dataset has no variable of any panel.
     """
-    panels = [panel for panel in PANELS["phi" if on_ring(ds) else "x"] if present(ds, panel)]
+    panels = [panel for panel in PANELS[next((name for name in PANELS if name in ds), "x")] if present(ds, panel)]
     if not panels:
         raise InputError("ds", f"has no variable that a history shows: {', '.join(chain(*chain(*PANELS.values())))}")
     if not compares_laws(ds):

@@ -44,6 +44,9 @@ _SHORT_NAMES = {
 
 _LEGEND = {"omega": "body", "ring_omega": "ring", "velocity": "body", "belt_velocity": "belt"}
 _LEGEND |= {f"{name}_{k}": f"contact {k}" for name in ("normal", "gap") for k in (1, 2)}
+_OF_MASSES = {f"{name}_{k}": f"mass {k}" for name in ("x", "velocity", "friction_force") for k in (1, 2)}
+_SHORT_NAMES |= {name: _SHORT_NAMES[name[:-2]] for name in _OF_MASSES}
+_LEGEND |= _OF_MASSES
 
 
 def history(ds: xr.Dataset) -> Figure:

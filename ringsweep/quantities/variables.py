@@ -221,6 +221,18 @@ OUTCOMES: dict[str, Variable] = {
     "level": Variable("1", "halvings of the blocks of the map around the cell", dtype="int8"),
 }
 
+#: Masses of a pair on a belt. The numbers of mass 1 are those of a belt, with ``_1`` after their names.
+MASSES = (1, 2)
+
+_ON_BELT = (
+    *("motion", "x_end", "velocity_end", "x_min", "x_max", "velocity_max", "stick_time", "slips", "first_slip"),
+    *("period", "stick_share", "stops_per_cycle", "swing", "drift", "long_run", "force_max", "jump_max", "t_jump_max"),
+)
+for _i in MASSES:
+    for _table, _names in ((HISTORY, ("x", "velocity", "friction_force", "mode")), (OUTCOMES, _ON_BELT)):
+        for _name in _names:
+            _table[f"{_name}_{_i}"] = replace(_table[_name], long_name=f"{_table[_name].long_name}, of mass {_i}")
+
 #: Outcomes that are the points of a section, place and velocity first.
 POINTS = tuple(
     f"{name}_section"
@@ -249,6 +261,11 @@ OUTCOMES |= {
         *("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "period"),
         *("open_time", "flight_time", "gap_max", "impact_speed_max", "impulse_max", "impact_loss", "t_recovered"),
         *("normal_min_1", "normal_min_2", "normal_max_1", "normal_max_2", "force_max", "jump_max"),
+        *(
+            f"{name}_{i}"
+            for i in MASSES
+            for name in ("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "period", "force_max", "jump_max")
+        ),
     )
 }
 

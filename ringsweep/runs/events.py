@@ -87,16 +87,20 @@ def _edges(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:
 
 
 def _changes_of_mode(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:
-    times, mode = run["time"].values, run["mode"].values.astype(int)
-    if "impact_time" in run:
-        # A body in flight neither sticks nor slips.
-        reactions = [run[name].values for name in ("normal_1", "normal_2") if name in run]
-        mode = np.where(np.all(np.array(reactions) == 0.0, axis=0), _FLIGHT, mode)
-    at = np.flatnonzero((np.diff(mode) != 0) & (np.diff(times) == 0.0))
-    before, after = mode[at], mode[at + 1]
-    breaks = (before == 0) & (after != _FLIGHT)
-    for kind, which in (("stop", after == 0), ("breakaway", breaks), ("reversal", before * after == -1)):
-        yield Events(kind, times[at][which], np.zeros(np.count_nonzero(which), dtype=np.int8))
+    # Of two masses each has a mode.
+    for contact, name in enumerate(("mode", "mode_1", "mode_2")):
+        if name not in run:
+            continue
+        times, mode = run["time"].values, run[name].values.astype(int)
+        if "impact_time" in run:
+            # A body in flight neither sticks nor slips.
+            reactions = [run[name].values for name in ("normal_1", "normal_2") if name in run]
+            mode = np.where(np.all(np.array(reactions) == 0.0, axis=0), _FLIGHT, mode)
+        at = np.flatnonzero((np.diff(mode) != 0) & (np.diff(times) == 0.0))
+        before, after = mode[at], mode[at + 1]
+        breaks = (before == 0) & (after != _FLIGHT)
+        for kind, which in (("stop", after == 0), ("breakaway", breaks), ("reversal", before * after == -1)):
+            yield Events(kind, times[at][which], np.full(np.count_nonzero(which), contact, dtype=np.int8))
 
 
 def _end(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:

@@ -165,7 +165,7 @@ def _measure(config: Config, target: float, cells: int, rounds: int, progress: b
     def answer(rows: NDArray[np.float64], steps: float | None = None) -> Answer:
         number = dict(zip(names, rows.T, strict=True))
         # The state at which a failed run stopped is no answer.
-        end = np.where(number["regime"] == FAILED, np.nan, number[f"{model.place}_end"])
+        end = np.where(number["regime"] == FAILED, np.nan, number[model.place_end])
         separation = number.get("t_separation", np.full(len(rows), np.nan))
         return Answer(end, separation, agree(rows, tight, names)[:, np.newaxis], steps)
 

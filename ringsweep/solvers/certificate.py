@@ -26,10 +26,10 @@ from ringsweep.quantities.flags import (
     NO_RESULT,
     NOT_FINITE,
 )
-from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.quantities.variables import MASSES, OUTCOMES
 
 #: Outcomes on which two resolutions must agree for a certificate.
-_CERTIFIED = ("regime", "motion", "separating_contact", "aftermath", "word")
+_CERTIFIED = ("regime", "motion", "motion_1", "motion_2", "separating_contact", "aftermath", "word")
 
 # Outcomes that may be NaN in a certified run.
 _MAY_LACK = (
@@ -45,6 +45,11 @@ _MAY_LACK = (
     "normal_max_2",
     *tangent.OUTCOMES,
     *(name for name, variable in OUTCOMES.items() if "section" in variable.dims),
+    *(
+        f"{name}_{i}"
+        for i in MASSES
+        for name in ("first_slip", "period", "stops_per_cycle", "swing", "jump_max", "t_jump_max")
+    ),
 )
 
 # Forces, and jumps of the acceleration: they follow from the motion, and friction may magnify its errors.
@@ -182,21 +187,28 @@ def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
     The difference between such runs says nothing about the error. A body that sticks all the time is no such case: the
     drive alone decides its motion.
     """
-    ends = [column for column, name in enumerate(with_errors(runs.outcomes)) if name.endswith("_end")]
+    ends = [column for column, name in enumerate(with_errors(runs.outcomes)) if "_end" in name]
     # The time for which it sticks is a sum, which is rounded.
     one, _ = runs.named
-    stuck = np.isclose(one.stick_time, one.t_end, rtol=1e-12, atol=0.0)
+    stuck = np.isclose([vars(one)[name] for name in _columns_of(runs, "stick_time")], one.t_end, rtol=1e-12, atol=0.0)
+    stuck = stuck.all(axis=0)
     difference, scale = runs.differences
     with np.errstate(invalid="ignore"):
         same = (difference <= _SAME * scale)[:, ends].all(axis=1)
     return np.asarray(same & ~stuck)
 
 
+def _columns_of(runs: TwoRuns, name: str) -> list[str]:
+    """The outcome of this name, or those of several masses."""
+    return [name] if name in runs.outcomes else [f"{name}_{i}" for i in MASSES]
+
+
 def apart(runs: TwoRuns) -> NDArray[np.float64]:
     """Largest difference between both runs of each cell in any number, relative to the scale of the number."""
     difference, scale = runs.differences
     # Laps of other lengths, and forces at other events, are no measure of divergence.
-    lasting = [k for k, name in enumerate(with_errors(runs.outcomes)) if name not in ("period", *_FORCES)]
+    passing = (*_columns_of(runs, "period"), *_FORCES)
+    lasting = [k for k, name in enumerate(with_errors(runs.outcomes)) if name not in passing]
     return _largest(difference[:, lasting], scale[:, lasting])
 
 
@@ -285,18 +297,20 @@ def errors(
                 bound[:, k] += rate_floor * (scale[:, place] if "rad" in units else 1.0)
             if names[k] in _FORCES:
                 bound[:, k] += force_floor * scale[:, k]
-            if names[k] == "force_max":
+            if names[k].startswith("force_max"):
                 bound[:, k] += friction_floor * scale[:, k]
     # A run that reaches the end of the span has an exact time of its end, and without an event nothing jumps.
     one, _ = runs.named
-    end, jump = names.index("t_end"), names.index("jump_max")
+    end, jumps = names.index("t_end"), _columns_of(runs, "jump_max")
     bound[(one.regime == one.motion) & (difference[:, end] == 0.0), end] = 0.0
-    bound[(one.jump_max == 0.0) & (difference[:, jump] == 0.0), jump] = 0.0
     # If two runs end at nearly the same event by chance, their last velocities are close by the same chance.
-    last = names.index("omega_end" if "omega_end" in names else "velocity_end")
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        acceleration = np.minimum(difference[:, last] / difference[:, end], scale[:, jump])
-        bound[:, last] = np.fmax(bound[:, last], bound[:, end] * acceleration)
+    lasts = ["omega_end"] if "omega_end" in names else _columns_of(runs, "velocity_end")
+    for jump_max, velocity_end in zip(jumps, lasts, strict=True):
+        jump, last = names.index(jump_max), names.index(velocity_end)
+        bound[(vars(one)[jump_max] == 0.0) & (difference[:, jump] == 0.0), jump] = 0.0
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            acceleration = np.minimum(difference[:, last] / difference[:, end], scale[:, jump])
+            bound[:, last] = np.fmax(bound[:, last], bound[:, end] * acceleration)
     bound[~agree(runs.rows, runs.second_rows, runs.outcomes)] = np.nan
     return bound
 
