@@ -138,6 +138,15 @@ def test_equal_masses_move_as_one_and_do_not_feel_their_coupling():
         np.testing.assert_allclose(found[f"{name}_2"], found[f"{name}_1"], rtol=1e-9, atol=1e-9)
 
 
+def test_rigidly_coupled_masses_move_as_one_body():
+    pair = runs(coupled(coupling=1e5), {"belt.velocity": [0.1, 0.2]}, certify=False)
+    scene = {"model": "belt", "body": {"mass": 2.5}, "spring": {"stiffness": 5.0}, "belt": {"velocity": 0.1}}
+    one = runs(scene | {"friction": STICTION, "time": {"span": 40.0}}, {"belt.velocity": [0.1, 0.2]}, certify=False)
+    for j in (1, 2):
+        assert (pair.ringsweep.words(f"motion_{j}") == one.ringsweep.words("motion")).all()
+        np.testing.assert_allclose(pair[f"x_max_{j}"], one.x_max, rtol=1e-3)
+
+
 def test_bounds_of_certified_pairs_hold():
     points = random_pairs(16, seed=7)
     found = runs(coupled(), points)

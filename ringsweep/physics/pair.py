@@ -41,7 +41,7 @@ class BeltPair(NamedTuple):
     ----------
     body : Pair
     first, second : Belt
-        Each mass on the belt while the other one is held: for the scales of its motion, and for its record.
+        Each mass on the belt if the other one followed it on its spring: for the scales of its motion, and its record.
     law, drive : NamedTuple
         Friction law, and drive of the belt.
     span : float

@@ -9,6 +9,8 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from ringsweep.models.belt import Belt
 from ringsweep.models.model import Model
 from ringsweep.models.pair.words import OF_EACH
@@ -90,13 +92,17 @@ class BeltPair(Model):
 
 
 def _alone(structure: Structure, values: Values, i: str) -> Any:
-    """Cells of one mass while the other one is held: the spring between them is one to the wall."""
+    """Cells of one mass if the other one followed it without inertia and friction, on its spring."""
     shared = {path: v for path, v in values.items() if path.partition(".")[0] in ("belt", "drive", "time", "gravity")}
     own = {
         f"{of}.{name}": f"{of}.{name}_{i}" for of, name in (("body", "mass"), ("initial", "x"), ("initial", "velocity"))
     }
     found = shared | {path: values[of_mass] for path, of_mass in own.items() if of_mass in values}
-    found["spring.stiffness"] = values[f"spring.stiffness_{i}"] + values["spring.coupling"]
+    coupling, other = values["spring.coupling"], values["spring.stiffness_1" if i == "2" else "spring.stiffness_2"]
+    both = coupling + other
+    # Two springs in a row. A stiff one between the masses leaves the slow swing of both.
+    in_a_row = coupling * np.divide(other, both, out=np.zeros_like(both), where=both > 0.0)
+    found["spring.stiffness"] = values[f"spring.stiffness_{i}"] + in_a_row
     names = friction.coefficients_of(structure.law_type)
     for path in (f"friction.{name}" for name in names):
         found[path] = values.get(f"{path}_{i}", values[path])
