@@ -155,9 +155,19 @@ class TestTable:
             before, after = shape(drive, knot - 1e-10)[1], shape(drive, knot + 1e-10)[1]
             assert after == pytest.approx(before, rel=1e-6, abs=1e-6)
 
-    def test_drive_of_straight_lines_is_refused_since_its_velocity_would_jump(self, scene):
-        drive = {"law": "table", "time": [0.0, 1.0, 5.0], "theta": [0.0, 1.0, 0.0], "interpolate": "linear"}
-        problem = "scene.drive.interpolate: 'linear' is no interpolation of a drive"
+    def test_spline_that_overshoots_a_step_is_warned_of(self, scene, caplog):
+        step = {"law": "table", "time": [0.0, 0.5, 0.51, 1.0, 1.01, 5.0], "theta": [0.0, 0.0, 3.0, 3.0, 0.0, 0.0]}
+        load({"scene": scene | {"drive": step | {"interpolate": "monotone"}}})
+        assert not caplog.messages
+        load({"scene": scene | {"drive": step}})
+        assert "the spline leaves the range of its table by 1.85e+03" in caplog.text
+
+    @pytest.mark.parametrize("interpolate", ["linear", "step"])
+    def test_table_of_a_drive_that_would_jump_is_refused_with_a_remedy(self, scene, interpolate):
+        drive = {"law": "table", "time": [0.0, 1.0, 5.0], "theta": [0.0, 1.0, 0.0], "interpolate": interpolate}
+        problem = (
+            f"scene.drive.interpolate: '{interpolate}' is no interpolation of a drive: its place must not jump; .*velo"
+        )
         with pytest.raises(InputError, match=problem):
             load({"scene": scene | {"drive": drive}})
 

@@ -92,6 +92,33 @@ def test_pulses_move_a_body_as_the_closed_form_says():
         np.testing.assert_allclose([runs.x_end[i], runs.velocity_end[i]], [place, velocity], atol=1e-8)
 
 
+@pytest.mark.slow
+def test_steps_of_a_table_move_a_body_as_the_closed_form_says():
+    times, samples = [0.0, 0.7, 1.9, 2.0, 3.3, 4.8, 6.0], [1.0, -3.0, 2.5, 0.0, 4.0, -2.0, 9.0]
+    force = {"time": times, "force": samples, "interpolate": "step", "amplitude": 1.3}
+    scene = belt(None, force, {"law": "stiction", "mu_s": 0.12, "mu_k": 0.06}) | {"damper": {"coefficient": 0.3}}
+    run = ringsweep.simulate(scene | {"initial": {"x": 0.2, "velocity": 0.4}}, samples=40)
+    x, v = 0.2, 0.4
+    for (t, end), sample in zip(pairwise(times), samples, strict=False):
+        x, v = moved(x, v, 1.3 * sample, end - t, k=4.0, c=0.3, static=0.12 * G, kinetic=0.06 * G)
+        inside = (run.time.values > t) & (run.time.values < end)
+        assert (run.force.values[inside] == 1.3 * sample).all()
+        # A row with a jump is there before and after it.
+        assert {*run.force.values[run.time.values == end][:2]} >= {1.3 * sample}
+    assert run.certified == 1
+    np.testing.assert_allclose([run.x_end, run.velocity_end], [x, v], atol=1e-9)
+
+
+def test_steps_of_a_table_are_the_formula_that_jumps_there():
+    steps = {"time": [-1.0, 0.5, 2.0, 6.0], "force": [3.0, -1.0, 2.0, 0.0], "interpolate": "step", "amplitude": 0.7}
+    by_formula = {"formula": "F*piecewise(t < T, 3, t < 4*T, -1, 2)", "F": 0.7, "T": 0.5}
+    a, b = (take(cells_of(belt(None, force)), 0).drive.added for force in (steps, by_formula))
+    for t in (0.0, 0.2, 0.5, 1.9, 2.0, 5.9):
+        drives.pass_knot(a, Instant(t, 0.0)), drives.pass_knot(b, Instant(t, 0.0))
+        assert drives.turn(a, Instant(t, 0.0)) == pytest.approx(drives.turn(b, Instant(t, 0.0)))
+        assert drives.knot_after(a, Instant(t, 0.0)).t == (0.5 if t < 0.5 else 2.0 if t < 2.0 else 6.0)
+
+
 #: Functions with switches, and what they are between these; d is a number between 0 and 1.
 SWITCHING = {
     "A*sign(sin(w*t + p) - d)": lambda t, A, w, p, d: A * np.sign(np.sin(w * t + p) - d),

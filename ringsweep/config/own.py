@@ -247,6 +247,7 @@ INTERPOLATIONS = {
     "force": {
         "monotone": "a cubic between each two rows that stays between them: its rate is continuous",
         "linear": "straight lines",
+        "step": "each row holds until the next one",
     },
 }
 INTERPOLATIONS["body.load"] = INTERPOLATIONS["force"]
@@ -265,6 +266,10 @@ def read_samples(doc: Document, given: dict[str, Any], section: str) -> tuple[Fl
     """Times, samples and interpolation of a drive or a force from a table; see :func:`read_table`."""
     known, where = INTERPOLATIONS[section], f"scene.{section}.interpolate"
     problem = f"is no interpolation of a {section}"
+    if section == "drive":
+        problem += (
+            ": its place must not jump; for steps of its velocity give `law: formula` with velocity: piecewise(...)"
+        )
     interpolate = one_of(given.get("interpolate", next(iter(known))), known, where, problem)
     return *read_table(doc, given, section, 4 if interpolate == "spline" else 2), interpolate
 

@@ -181,7 +181,7 @@ def table_of(
     amplitude: NDArray[np.float64],
     what: str,
     values: Values,
-) -> drives.Table:
+) -> drives.Table | drives.Steps:
     """Drive from a table, with fields of shape ``(cells, ...)``.
 
     Parameters
@@ -209,6 +209,8 @@ def table_of(
         values["time.span"],
         f"{{}} s is longer than the table of the {what}, which ends at {times[-1]:.6g} s",
     )
+    if interpolate == "step":
+        return drives.steps(amplitude, times, samples)
     # Few drives are tables, and this import takes longer than a small sweep.
     from scipy.interpolate import CubicSpline, PchipInterpolator
 

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import function_from_lines, hook, inlined, lacking, take
 from ringsweep.numerics import clock, writer
-from ringsweep.numerics.expressions import ZERO, Node, derivative, evaluate, symbols_of
+from ringsweep.numerics.expressions import ZERO, Node, derivative, evaluate, held, multiply, symbol, symbols_of
 from ringsweep.numerics.functions import raised
 from ringsweep.numerics.rows import distinct_rows
 from ringsweep.numerics.series import INVERSE
 from ringsweep.physics.definitions import Definitions
-from ringsweep.physics.friction.formula import FormulaError
+from ringsweep.physics.friction.formula import FormulaError, Threshold
 from ringsweep.physics.functions_of_time import (
     Function,
     check,
@@ -35,6 +35,7 @@ from ringsweep.physics.functions_of_time import (
     read_function,
     read_rate,
     size_at_start,
+    table_of_knots,
 )
 from ringsweep.quantities.parameters import Leaf, Parameter
 
@@ -89,9 +90,9 @@ def shape_numbers(drive: Any) -> list[Any]:
     if function is not None:
         needed = symbols_of(function.factors[1], function.shape_rate)
         knots = getattr(drive, "knots", None)
-        return [getattr(drive, name) for name in needed] + (
-            [] if knots is None else list(knots.reshape(len(knots), -1).T)
-        )
+        # Knots that all cells share tell none from another.
+        own_knots = [] if knots is None or knots.strides[0] == 0 else list(knots.reshape(len(knots), -1).T)
+        return [getattr(drive, name) for name in needed] + own_knots
     for name, part in zip(drive._fields, drive, strict=True):
         if isinstance(part, tuple):
             found += shape_numbers(part)
@@ -780,6 +781,22 @@ Sinusoidal = _drive(
 )
 
 add_drive("table", Table)
+
+#: Force or load by a table whose numbers each hold until the next row.
+Steps: Any = _make(
+    "Steps",
+    "Steps: between knots a held number, times an amplitude.",
+    Function("a table", multiply(symbol("amplitude"), held(0)), ZERO, "N", (Threshold(),), {}),
+    {"amplitude": Parameter("1", "factor on the table")},
+)
+
+
+def steps(amplitude: NDArray[np.float64], times: NDArray[np.float64], samples: NDArray[np.float64]) -> Any:
+    """Force or load of the shape ``(cells,)`` that has a sample from its time (s) on; the first time is not after 0."""
+    knots = np.broadcast_to(
+        table_of_knots([0.0], [0.0], times[None], samples[None]), (len(amplitude), 1, 2, len(times) + 1)
+    )
+    return Steps(amplitude, knots, np.stack(held_at(knots, 0.0 * amplitude), axis=1), 0.0 * amplitude)
 
 
 # ---- drives of users --------------------------------------------------------------------------

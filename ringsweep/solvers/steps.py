@@ -110,8 +110,13 @@ def scratch_for(rows: int, first_guard: int) -> Scratch:
 
 @kernel
 def tabulate_motion(drive, times, table):
-    """Fill a table of shape ``(times, numbers)`` with what :func:`ringsweep.physics.drives.turn` returns."""
+    """Fill a table of shape ``(times, numbers)`` with what :func:`ringsweep.physics.drives.turn` returns.
+
+    Of several rows at one time the first one is before a jump at that time, and the others after it.
+    """
     for i in range(len(times)):
+        rounding = -4e-16 if i == 0 or times[i] > times[i - 1] else 4e-16
+        drives.pass_knot(drive, times[i] * (1.0 + rounding))
         motion = drives.turn(drive, times[i])
         for k in range(len(motion)):
             table[i, k] = motion[k]
