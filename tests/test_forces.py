@@ -469,6 +469,7 @@ class TestParts:
             (TIMES | FORCES | {"interpolate": "spline"}, r"interpolate: 'spline' is no interpolation of a force"),
             ({"amplitude": 1.0, "frequency": 1.0, "interpolate": "linear"}, r"force\.time: missing: a table needs"),
             ({"formula": "A*sin(w*t)", "interpolate": "linear"}, r"interpolate: cannot stand beside"),
+            ({"formula": "A*floor(sin(w*t))", "A": 1.0, "w": 1.0}, r"formula: .*floor takes a straight line in t"),
         ],
     )
     def test_force_that_makes_no_sense_is_refused_by_its_path(self, force, message):

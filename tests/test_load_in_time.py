@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from belts import on_belt, outcome
+from test_functions_of_time import cells_of
 
 import ringsweep
 
@@ -43,6 +44,15 @@ def test_a_body_that_slides_on_is_driven_by_a_pulsating_load():
     x = mu * 9.81 / k * (1.0 - np.cos(own * t)) + forced * (np.sin(omega * t) - omega / own * np.sin(own * t))
     assert run.x_end.item() == pytest.approx(x, abs=1e-10)
     assert run.stick_time.item() == 0.0
+
+
+def test_the_table_of_a_load_has_a_factor():
+    table = {"time": [0, 2, 10], "load": [1, 4, -5], "interpolate": "step", "amplitude": 1.5}
+    cells = cells_of(braked(table))
+    assert cells.drive.added.knots[0, 0, 1].tolist() == [0.0, 1.0, 4.0, -5.0]
+    assert (cells.drive.added.amplitude, cells.drive.least_load) == (1.5, -7.5)
+    with pytest.raises(ringsweep.InputError, match=r"body\.load\.time: missing: a table needs a file"):
+        cells_of(braked({"amplitude": 2.0}))
 
 
 @pytest.mark.slow

@@ -85,7 +85,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         moved = replace(moved, table=own.read_samples(doc, scene["drive"], "drive"))
     if any(f"force.{name}" in leaves for name in own.TABLE_KEYS["force"]):
         moved = replace(moved, force=own.read_samples(doc, scene["force"], "force"))
-    if any(f"body.load.{name}" in leaves for name in own.TABLE_KEYS["body.load"]):
+    if moved.load is not None:
         moved = replace(moved, load=own.read_samples(doc, scene["body"]["load"], "body.load"))
     structures = {
         law: replace(moved, law=law, own_law=defined.get(law), curve=curve if law == own.TABLE_LAW else None)
@@ -157,10 +157,14 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
         return found
     # That they are sections is made sure of where their keys are read.
     friction, body = (one if isinstance(one := scene.get(key), dict) else {} for key in ("friction", "body"))
+    own_load = own.force_type(load := body.get("load"), "body.load")
+    # The table itself is read once its keys are known to be right.
+    table: Any = () if isinstance(load, dict) and own_load is None else None
     return replace(
         found,
         own_force=own.force_type(scene.get("force")),
-        own_load=own.force_type(body.get("load"), "body.load"),
+        own_load=own_load,
+        load=table,
         steady=_starts_steadily(scene, swept),
         two_way=_two_way(friction, swept),
         frame=one_of(friction.get("frame", "belt"), FRAMES, "scene.friction.frame", "is no frame of zones"),
