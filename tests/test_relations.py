@@ -20,6 +20,7 @@ LOADS = ("friction.viscous", "body.normal_stiffness", "force.constant")
 IN_STEP = {"drive.frequency": 0.5, "force.frequency": 1.0}
 BROAD = {"friction.alpha": 10.0, "friction.v0": 0.2}
 BOTH = ("friction.mu_s", "friction.mu_k")
+BOTH_IN_ZONES = tuple(f"friction.{place}.{mu}" for place in ("rough", "rest") for mu in ("mu_s", "mu_k"))
 STEPS = {"method": "rk4", "steps": 4000}
 KINDS = {
     "belt": Kind("belt", "stiction", force="harmonic", parts=SPRING, span=(2, 20)),
@@ -80,6 +81,11 @@ KINDS = {
         "belt", "hyperbolic", force="harmonic", parts=SLOPE, span=(2, 20), record={"exponent": True}, load=True
     ),
     "belt-ruina": Kind("belt", "ruina", "sinusoidal", parts=SLOPE, span=(1, 8), load=True),
+    "belt-two-way-bristles": Kind("belt", "elasto-plastic", force="harmonic", span=(1, 8), two_way=BOTH),
+    "ring-two-way": Kind("ring", "stiction", "sinusoidal", arcs=1, two_way=BOTH_IN_ZONES),
+    "contact-two-way-rk4": Kind(
+        "ring-single-contact", "bengisu-akay", arcs=1, solver=STEPS, fixed=BROAD, two_way=BOTH_IN_ZONES
+    ),
     "belt-dieterich": Kind("belt", "dieterich", force="harmonic", parts=("initial.contact_age",), span=(1, 8)),
     "belt-stops": Kind("belt", "stiction", force="harmonic", parts=SPRING, impact=True, span=(2, 20)),
     "belt-stops-smooth": Kind("belt", "bengisu-akay", force="harmonic", parts=LOADS, impact=True, span=(2, 20)),

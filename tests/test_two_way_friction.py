@@ -71,6 +71,58 @@ def test_two_equal_numbers_are_one_number():
 
 
 @pytest.mark.slow
+def test_two_equal_numbers_are_one_number_in_a_zone_of_a_ring():
+    rough, found = ({"mu_s": 0.4, "mu_k": 0.3}, {"mu_s": 0.4, "mu_k": {"forward": 0.3, "backward": 0.3}}), []
+    for one in rough:
+        friction = {"law": "stiction", "rough": one, "elsewhere": {"mu_s": 0.2, "mu_k": 0.1}}
+        scene = on_ring("ring", friction, drive={"law": "sinusoidal", "frequency": 1.0})
+        found.append(ringsweep.sweep(scene, {"drive.amplitude": np.linspace(0.1, 1.0, 12)}, progress=False))
+    xr.testing.assert_identical(*(run.drop_attrs() for run in found))
+
+
+def on_ring(model, friction, **rest):
+    """A body at the bottom of a ring, which has a zone if the friction has a rough one."""
+    body = {"inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01} if model == "ring" else {}
+    zone = {"zone": {"half_angle": 0.5}} if "rough" in friction else {}
+    scene = {"model": model, "body": {"mass": 0.076, **body}, "ring": {"radius": 0.05}, "friction": friction, **zone}
+    return scene | {"time": {"span": 2.0}} | rest
+
+
+@pytest.mark.slow
+def test_a_ring_lifts_a_body_up_to_the_static_friction_of_the_way():
+    # A ring that turns forwards leaves the body behind: it slides backwards.
+    mu = {"mu_s": {"forward": 0.4, "backward": 0.25}, "mu_k": {"forward": 0.3, "backward": 0.2}}
+    for omega, mu_s in ((1.0, 0.25), (-1.0, 0.4)):
+        motion = {"drive": {"law": "constant", "amplitude": omega}, "initial": {"omega": omega}}
+        run = ringsweep.simulate(on_ring("ring-single-contact", {"law": "stiction", "elsewhere": mu}, **motion))
+        excess = lambda phi: 9.81 * (np.sin(phi) - mu_s * np.cos(phi)) - mu_s * 0.05  # noqa: B023, E731
+        assert run.event_time[0].item() == pytest.approx(brentq(excess, 0.0, 1.0, xtol=1e-15), rel=1e-9)
+        assert run.certified.item() == 1
+
+
+@pytest.mark.slow
+def test_two_contacts_share_a_pull_as_the_friction_of_its_way_does():
+    """Contact 1 stands in a zone; the pull on the stuck body turns twice in a period."""
+    in_zone, beside = {"forward": 0.5, "backward": 0.2}, {"forward": 0.1, "backward": 0.3}
+    friction = {"law": "coulomb", "rough": {"mu_k": in_zone}, "elsewhere": {"mu_k": beside}}
+    drive = {"law": "sinusoidal", "amplitude": 0.02, "frequency": 1.0}
+    zone = {"half_angle": 0.5, "center": -0.6}
+    run = ringsweep.simulate(on_ring("ring", friction, drive=drive, zone=zone, initial={"omega": 0.04 * np.pi}))
+    assert (run["mode"] == 0).all()
+    assert run.certified.item() == 1
+    mass, inertia, radius, reach, half = 0.076, 4.47e-5, 0.05, 0.04, 0.025
+    xi, sine, cosine = (reach**2 - half**2) ** 0.5, half / reach, (1.0 - (half / reach) ** 2) ** 0.5
+    # Both friction forces from the balance about the axis and from the radial one.
+    both = ((inertia + mass * xi**2) * run.epsilon + mass * 9.81 * xi * np.sin(run.phi)) / radius
+    load = mass * (9.81 * np.cos(run.phi) + xi * run.omega**2)
+    apart = ((run.normal_1 + run.normal_2) * cosine - load) / sine
+    ways = np.where(both < 0.0, "forward", "backward")
+    mu_1, mu_2 = (np.array([mu[way] for way in ways]) for mu in (in_zone, beside))
+    assert {*ways} == {"forward", "backward"}
+    assert abs((both + apart) * mu_2 * run.normal_2 - (both - apart) * mu_1 * run.normal_1).max() < 1e-10
+
+
+@pytest.mark.slow
 def test_rk4_and_events_agree_under_a_smooth_law():
     friction = two_way((0.4, 0.3), (0.25, 0.1), "bengisu-akay", alpha=10.0, v0=0.05)
     scene = conveyor(friction, stiffness=8.0, velocity=0.2, force=(3.0, 0.4), start=(0.1, 0.3), span=6.0)
@@ -86,8 +138,8 @@ def test_rk4_and_events_agree_under_a_smooth_law():
         ({"law": "stiction", "mu_s": {"up": 0.3}, "mu_k": 0.1}, "scene.friction.mu_s.up: unknown key"),
         (two_way((0.3, 0.2), (0.1, 0.2)), "scene.friction.mu_k: 0.2 exceeds mu_s"),
         (
-            two_way((0.3, 0.2), (0.3, 0.2), "lugre", sigma0=1e4, v_s=0.1),
-            "scene.friction.mu_s: not available with law lugre",
+            {"law": "bristle", "mu_k": {"forward": 0.3, "backward": 0.2}, "sigma0": 1e4},
+            "scene.friction.mu_k: not available with law bristle",
         ),
     ],
 )

@@ -20,12 +20,16 @@ from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
 from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS, Scene, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
-from ringsweep.physics.friction.formula import COEFFICIENTS, NAMES
+from ringsweep.physics.friction.formula import NAMES
+from ringsweep.physics.friction.registry import SURFACE
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, quantity, show
 
 #: Values of ``initial.steady``.
 STEADY = {"slip": "the body rests in space, where spring, friction and constant forces balance"}
+
+# Ends of the paths of numbers of one direction.
+_ENDS = tuple(f".{way}" for way in WAYS)
 
 # Ratio of lengths of one scene above which a unit may be wrong: 1 m in place of 1 mm.
 _LARGEST_RATIO = 1000.0
@@ -153,6 +157,7 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
     section = "stops" if model == "belt" else "impact"
     impact = model in WITH_IMPACT and (section in scene or any(str(path).startswith(f"{section}.") for path in swept))
     found = Structure(model, "", drive, own_drive=own.drive_type(model, scene.get("drive", {})), impact=impact)
+    found = replace(found, two_way=_two_way(scene, swept))
     if not _takes_force(model):
         return found
     # That they are sections is made sure of where their keys are read.
@@ -166,7 +171,6 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
         own_load=own_load,
         load=table,
         steady=_starts_steadily(scene, swept),
-        two_way=_two_way(friction, swept),
         frame=one_of(friction.get("frame", "belt"), FRAMES, "scene.friction.frame", "is no frame of zones"),
     )
 
@@ -183,11 +187,20 @@ def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
     return True
 
 
-def _two_way(friction: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
+def _two_way(scene: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
     """Paths of the friction coefficients that the scene or the sweep gives for both directions of sliding."""
-    split = {f"friction.{name}" for name, value in friction.items() if isinstance(value, dict)}
-    split |= {path.rpartition(".")[0] for path in map(str, swept) if path.endswith(tuple(f".{way}" for way in WAYS))}
-    return tuple(path for name in (*COEFFICIENTS, "scale") if (path := f"friction.{name}") in split)
+    friction = section if isinstance(section := scene.get("friction"), dict) else {}
+    places = {f"friction.{name}": friction.get(name) for name in ("rough", *ELSEWHERE)}
+    places |= {"friction": friction, **{path: scene["zones"][i] for i, path in enumerate(_zones(scene))}}
+    split = {
+        f"{place}.{name}": None
+        for place, given in places.items()
+        if isinstance(given, dict)
+        for name, value in given.items()
+        if isinstance(value, dict)
+    }
+    split |= {path.rpartition(".")[0]: None for path in map(str, swept) if path.endswith(_ENDS)}
+    return tuple(path for path in split if path.rpartition(".")[2] in SURFACE)
 
 
 def _takes_force(model: str) -> bool:

@@ -18,6 +18,7 @@ from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.formula import COEFFICIENTS
 from ringsweep.physics.friction.laws import Table
+from ringsweep.physics.friction.registry import SURFACE
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.solvers import METHODS
 from ringsweep.statistics import DISTRIBUTIONS
@@ -38,7 +39,7 @@ def schema() -> dict[str, Any]:
                 parameter = dataclasses.replace(parameter, long_name=parameter.long_name.replace("zone 1", "the zone"))
                 known.setdefault(path, {})[parameter] = None
     leaves = {path: _any(*map(_number, meanings)) for path, meanings in known.items()}
-    for path in (f"friction.{name}" for name in (*COEFFICIENTS, "scale")):
+    for path in (path for path in leaves if path.rpartition(".")[2] in SURFACE):
         leaves[path] = _any(leaves[path], _section(dict.fromkeys(WAYS, leaves[path])))
     tables = {f"{of}.{name}": _list(_number(p)) for of, columns in own.TABLES.items() for name, p in columns.items()}
     for of, columns in own.TABLES.items():
@@ -172,8 +173,11 @@ def _solver() -> dict[str, Any]:
 def _sweep(paths: list[str]) -> dict[str, Any]:
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
     laws = _list(_laws("friction law"))
-    parameter = rf"^(friction|drive|force|body\.load)\.[A-Za-z][A-Za-z0-9_]*(\.({'|'.join(WAYS)}))?$"
-    names = {"anyOf": [{"enum": [LAW, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": parameter}]}
+    parameter = r"^(friction|drive|force|body\.load)\.[A-Za-z][A-Za-z0-9_]*$"
+    places = "|".join(("friction", *(rf"friction\.{name}" for name in ("rough", *ELSEWHERE)), r"zones\.[0-9]+"))
+    of_way = rf"^({places})\.[A-Za-z][A-Za-z0-9_]*\.({'|'.join(WAYS)})$"
+    patterns = rf"^zones\.[0-9]+\.({arcs})$", parameter, of_way
+    names = {"anyOf": [{"enum": [LAW, *paths]}, *({"pattern": pattern} for pattern in patterns)]}
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(axes.COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(_VALUE), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}

@@ -1,5 +1,7 @@
 """Models by name, the parameters of their scenes, and the cells that kernels run over."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
@@ -11,7 +13,7 @@ from ringsweep.models.belt import Belt, StopBelt
 from ringsweep.models.model import Model
 from ringsweep.models.pair import BeltPair
 from ringsweep.models.ring import Ring, RingImpact, SingleContactImpact, SingleContactRing
-from ringsweep.models.scene import Structure, Values
+from ringsweep.models.scene import WAYS, Structure, Values
 from ringsweep.quantities.parameters import Parameter
 
 __all__ = ["MODELS", "WITH_IMPACT", "Model", "Structure", "Values", "add_model", "batch", "model_of", "parameters"]
@@ -55,7 +57,17 @@ def model_of(structure: Structure) -> Model:
 
 def parameters(structure: Structure) -> dict[str, Parameter]:
     """Parameters of a scene of this structure by path, in the order of the documentation."""
-    return model_of(structure).parameters(structure)
+    found = model_of(structure).parameters(structure)
+    return {way: p for path, own in found.items() for way, p in _each_way(structure, path, own)}
+
+
+def _each_way(structure: Structure, path: str, p: Parameter) -> Iterator[tuple[str, Parameter]]:
+    """A parameter by path; if it is given for both directions of sliding, both of them."""
+    if path not in structure.two_way:
+        yield path, p
+        return
+    for way in WAYS:
+        yield f"{path}.{way}", replace(p, long_name=f"{p.long_name}, sliding {way}")
 
 
 def batch(structure: Structure, values: Values) -> Any:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import absorbed
 from ringsweep.errors import InputError
-from ringsweep.models.scene import Structure, Values, require
+from ringsweep.models.scene import WAYS, Structure, Values, require
 from ringsweep.numerics.functions import any_of, select, square_root
 from ringsweep.physics import drives, friction, zones
 from ringsweep.physics.friction.formula import FormulaError
@@ -96,7 +96,23 @@ def zone_parameters(structure: Structure, zone: type, rest: str) -> dict[str, Pa
 
 
 def surface_from(structure: Structure, values: Values, zone: Any, period: Any = 2.0 * np.pi) -> tuple[Any, list[Any]]:
-    """Surface with zones of a type, and pairs of friction coefficients of all parts; see :func:`zones.surface_of`."""
+    """Surface with zones of a type, and pairs of friction coefficients of all parts; see :func:`zones.surface_of`.
+
+    Without a type of zone, coefficients have no place of their own. If they depend on the direction, the pairs of
+    forward sliding come before those of backward sliding.
+    """
+    if not structure.two_way:
+        return _surface_one_way(structure, values, zone, period)
+    given = [path for path in structure.two_way if f"{path}.{WAYS[0]}" in values]
+    of_ways = ({path: values[f"{path}.{way}"] for path in given} for way in WAYS)
+    (ahead, pairs), (back, others) = (
+        _surface_one_way(structure, {**values, **of_way}, zone, period) for of_way in of_ways
+    )
+    return zones.two_way(ahead, back), [*pairs, *others]
+
+
+def _surface_one_way(structure: Structure, values: Values, zone: Any, period: Any) -> tuple[Any, list[Any]]:
+    """What :func:`surface_from` returns for one direction of sliding."""
     rough = "friction.rough" if structure.arcs == ("zone",) else None
     arcs = [
         zone(
@@ -105,7 +121,7 @@ def surface_from(structure: Structure, values: Values, zone: Any, period: Any = 
         )
         for arc in structure.arcs
     ]
-    rest = friction_coefficients(structure, f"friction.{structure.elsewhere}", values)
+    rest = friction_coefficients(structure, f"friction.{structure.elsewhere}" if zone else "friction", values)
     return zones.surface_of(arcs, *rest, period), [rest, *((arc.mu_s, arc.mu_k) for arc in arcs)]
 
 

@@ -34,8 +34,9 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import feature, hook, inlined
 from ringsweep.physics import pivot, ring
+from ringsweep.physics.friction.ways import TwoWay, along, facing
 
 #: Modes of the contacts. CLOSED: slip goes on with both closed. OPEN_1, OPEN_2, OPEN_BOTH: these contacts open. STICK,
 #: FORWARD, BACKWARD: motion from rest with both closed. IMPOSSIBLE: no unique motion of rigid bodies.
@@ -56,7 +57,7 @@ def stick(body, m1, m2, motion, epsilon):
     Parameters
     ----------
     body : NamedTuple
-    m1, m2 : float
+    m1, m2 : float or TwoWay
         Static friction coefficients under the contacts, 1.
     motion : tuple of float
         Sine and cosine of the angle of the body, and its angular velocity, rad/s.
@@ -71,6 +72,7 @@ def stick(body, m1, m2, motion, epsilon):
         this acceleration.
     """
     N1, N2, F1 = ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0)
+    m1, m2 = facing((m1, m2), -F1)
     friction, capacity = F1, m1 * N1
     if ring.contact_count(body) == 2:
         at_zero, by_F2 = (N1, N2, F1), by_friction(body)
@@ -211,7 +213,8 @@ def opening(body, friction, static, slides, motion, epsilon):
     """
     load, _ = ring.reactions(body, 0.0, 0.0, motion)
     if slides != 0:
-        _, determinant = ring.acceleration(body, *friction, motion)
+        K1, K2 = along(friction[0], 0.0), along(friction[1], 0.0)
+        _, determinant = ring.acceleration(body, K1, K2, motion)
         load = 0.0 if determinant > 0.0 else load
     return IMPOSSIBLE if load > _ROUNDING * body.mass * _size_per_mass(body, motion[2], epsilon) else OPEN_1
 
@@ -220,8 +223,8 @@ def opening(body, friction, static, slides, motion, epsilon):
 def _carries_alone(body, side, k, m, slides, motion, epsilon):
     """Whether one contact can carry the body while the other contact opens.
 
-    `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are friction and static friction at this contact, and
-    the rest is as for :func:`opening`.
+    `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are friction and static friction at this contact, a
+    TwoWay of a body at rest if they depend on the direction, and the rest is as for :func:`opening`.
     """
     b, (sin_phi, cos_phi, omega), (sb, cb) = body, motion, (side * body.sin_beta, body.cos_beta)
     # The moment of inertia may be zero; a lower bound avoids the division by zero.
@@ -234,10 +237,11 @@ def _carries_alone(body, side, k, m, slides, motion, epsilon):
     least = -_ROUNDING * (abs(b.gravity * cos_phi + b.xi * square) + abs(b.gravity * sin_phi) + abs(carried))
     if slides == 0:
         psi_dd, alpha_dd, load, pull = pivot.in_stick(f, carried)
-        if load > 0.0 and abs(pull) <= m * load and arm * (psi_dd - alpha_dd) > least:
+        if load > 0.0 and abs(pull) <= along(m, -pull) * load and arm * (psi_dd - alpha_dd) > least:
             return True
     for sign in (-1.0, 1.0):
-        K = k if slides != 0 else -sign * k
+        mu = along(k, sign)
+        K = mu if slides != 0 else -sign * mu
         found = pivot.in_slip(f, K)
         starts = slides != 0 or sign * pivot.sliding_acceleration(f, found, carried) > 0.0
         opens = arm * (found[0] - found[1]) > least
@@ -319,6 +323,12 @@ def _slip_margin(body, sign, friction, tangential, motion, epsilon):
     return margin if margin >= -1.0 else -1.0
 
 
+@feature("max(forward, backward)", of=TwoWay)
+def _either(static, forward, backward):
+    """Friction coefficient of a contact just after breakaway: the larger one, or both if they depend on the way."""
+    return TwoWay(forward, backward)
+
+
 @inlined
 def at_rest(body, static, forward, backward, motion, epsilon, released):
     """Mode of a body that is at rest on the ring.
@@ -326,7 +336,7 @@ def at_rest(body, static, forward, backward, motion, epsilon, released):
     Parameters
     ----------
     body : NamedTuple
-    static : tuple of float
+    static : tuple of float or TwoWay
         Static friction coefficients under both contacts, 1.
     forward, backward : tuple of float
         Friction coefficients under both contacts just after breakaway forwards and backwards, 1.
@@ -341,18 +351,18 @@ def at_rest(body, static, forward, backward, motion, epsilon, released):
     int
         STICK, FORWARD, BACKWARD, OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE.
     """
-    m1, m2 = static
+    limit = facing(static, float(released))
     held = -1.0
     if released == 0:
-        _, reserve, n1, n2 = stick(body, m1, m2, motion, epsilon)
+        _, reserve, n1, n2 = stick(body, *static, motion, epsilon)
         load = body.mass * _size_per_mass(body, motion[2], epsilon)
         # Without friction or without a load the body cannot stick.
-        if m1 + m2 > 0.0 and min(n1, n2) > _ROUNDING * load:
+        if limit[0] + limit[1] > 0.0 and min(n1, n2) > _ROUNDING * load:
             held = min(reserve, min(n1, n2)) / load
         if held >= 0.0:
             return STICK
-    ahead = _slip_margin(body, 1.0, forward, released == 1 and forward == static, motion, epsilon)
-    back = _slip_margin(body, -1.0, backward, released == -1 and backward == static, motion, epsilon)
+    ahead = _slip_margin(body, 1.0, forward, released == 1 and forward == limit, motion, epsilon)
+    back = _slip_margin(body, -1.0, backward, released == -1 and backward == limit, motion, epsilon)
     if ahead > 0.0 or back > 0.0:
         if min(ahead, back) > 0.0:
             return IMPOSSIBLE
@@ -361,7 +371,7 @@ def at_rest(body, static, forward, backward, motion, epsilon, released):
     loaded = body.gravity > 0.0 or motion[2] != 0.0
     if loaded and max(held, max(ahead, back)) >= -_ROUNDING:
         return FORWARD if ahead >= max(held, back) else BACKWARD if back >= held else STICK
-    friction = max(forward[0], backward[0]), max(forward[1], backward[1])
+    friction = _either(static[0], forward[0], backward[0]), _either(static[1], forward[1], backward[1])
     return opening(body, friction, static, 0, motion, epsilon)
 
 

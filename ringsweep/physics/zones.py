@@ -20,6 +20,7 @@ from numba import types
 
 from ringsweep.compile import absorbed, feature, function_from_lines, inlined, specialise
 from ringsweep.numerics.functions import floor, nearest, select
+from ringsweep.physics.friction.ways import TwoWay
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 HALF_ANGLE = Parameter("rad", "half-angle of the zone", lower=0.0, upper=pi)
@@ -36,8 +37,8 @@ _NEGLIGIBLE_WIDTH = 1e-14
 class Uniform(NamedTuple):
     """Ring with the same friction coefficients everywhere."""
 
-    mu_s: float
-    mu_k: float
+    mu_s: Any
+    mu_k: Any
 
 
 class Ruler(NamedTuple):
@@ -69,7 +70,7 @@ class Segments(NamedTuple):
     ----------
     edges : ndarray or tuple
         Lower edges of the segments in ascending order, rad, from 0 to less than 2 pi.
-    mu_s, mu_k : ndarray or tuple
+    mu_s, mu_k : ndarray, tuple or TwoWay
         Static and kinetic friction coefficient, 1.
     arc : ndarray or tuple
         Number of the zone, counted from 1; 0 outside the zones.
@@ -87,7 +88,7 @@ class Segments(NamedTuple):
     mu_s: Any
     mu_k: Any
     arc: Any
-    roughest: tuple[Leaf, Leaf]
+    roughest: tuple[Any, Any]
     narrowest: Leaf
     ruler: Any = ()
     frame: Any = ()
@@ -172,7 +173,24 @@ def surface_of(arcs: Any, mu_s: Any, mu_k: Any, period: Any = 2.0 * pi) -> Unifo
     return Segments(edges, static, kinetic, index, roughest, narrowest, ruler, frame)
 
 
+def two_way(ahead: Any, back: Any) -> Any:
+    """Surface of which `ahead` are the coefficients of a body that slides forwards, and `back` those of the other way.
+
+    Both have the same segments.
+    """
+    of_ways: dict[str, Any] = {name: TwoWay(getattr(ahead, name), getattr(back, name)) for name in ("mu_s", "mu_k")}
+    if isinstance(ahead, Segments):
+        of_ways["roughest"] = tuple(map(TwoWay, ahead.roughest, back.roughest))
+    return ahead._replace(**of_ways)
+
+
 # The defaults are those of a uniform surface.
+
+
+@feature("values[segment]", of=TwoWay)
+def _in_segment(values, segment):
+    """Coefficient in a segment."""
+    return TwoWay(values.forward[segment], values.backward[segment])
 
 
 @feature("surface.mu_s, surface.mu_k, 0.0", of=Segments)
@@ -189,7 +207,7 @@ def coefficients(surface, segment):
     tuple of float
         Static and kinetic coefficient, 1; number of the zone, 0 for none.
     """
-    return surface.mu_s[segment], surface.mu_k[segment], surface.arc[segment]
+    return _in_segment(surface.mu_s, segment), _in_segment(surface.mu_k, segment), surface.arc[segment]
 
 
 def value_at(values, edges, x):
@@ -214,8 +232,15 @@ def value_at(values, edges, x):
     return found
 
 
+def _is_two_way(values: Any) -> bool:
+    """Whether coefficients depend on the direction, by their Numba type."""
+    return getattr(values, "instance_class", None) is TwoWay
+
+
 def _value_at_for_kernels(values: Any, edges: Any, x: Any) -> Any:
     """Code of :func:`value_at` for kernels: without a loop where the segments are tuples."""
+    if _is_two_way(values):
+        return lambda values, edges, x: TwoWay(value_at(values.forward, edges, x), value_at(values.backward, edges, x))
     if isinstance(values, types.Array):
         return value_at
     lines = [f"found = values[{len(values) - 1}]"]
@@ -261,7 +286,7 @@ def _roughness_of_two_segments(surface, turns, shift):
 def _choose_roughness(surface: Any, turns: Any, shift: Any) -> Any:
     """Function that finds both coefficients for the type of a surface."""
     edges = surface[0]
-    two = isinstance(edges, types.BaseTuple) and len(edges) == 2
+    two = isinstance(edges, types.BaseTuple) and len(edges) == 2 and not _is_two_way(surface[1])
     return _roughness_of_two_segments if two else _roughness_of_segments
 
 
@@ -286,6 +311,8 @@ def _latest(values, edges, x):
 
 def _latest_for_kernels(values: Any, edges: Any, x: Any) -> Any:
     """Code of :func:`_latest` for kernels: without a loop where the segments are tuples."""
+    if _is_two_way(values):
+        return lambda values, edges, x: TwoWay(_latest(values.forward, edges, x), _latest(values.backward, edges, x))
     if isinstance(values, types.Array):
         return _latest
     lines = [f"found = select(edges[{j}] <= x, values[{j}], found)" for j in range(len(values))]

@@ -10,7 +10,7 @@ Read :mod:`ringsweep.physics.friction.presliding` first. `sign` is the direction
 from __future__ import annotations
 
 from ringsweep.compile import absorbed
-from ringsweep.models.belt.force import length_scale
+from ringsweep.models.belt.force import coefficients, length_scale
 from ringsweep.models.belt.mode import NORMAL, SLOW, Mode, after_guard, mode_at
 from ringsweep.models.belt.record import record_at_launch
 from ringsweep.models.belt.switch import deflection_at_start
@@ -32,19 +32,20 @@ from ringsweep.physics.friction.presliding import (
     stick_speed,
 )
 from ringsweep.physics.friction.velocity import BAND, KINETIC
+from ringsweep.physics.friction.ways import along
 
 
 @absorbed
 def _sliding(scene, motion, x, sign, region):
     """The :class:`Slip` of a sliding velocity and a deflection, `x`."""
-    K, slope, bundle = bundled(scene.law, (scene.mu_s, scene.mu_k), *x, sign, region)
+    K, slope, bundle = bundled(scene.law, coefficients(scene, sign), *x, sign, region)
     return Slip(motion, x[0], (K, K), (slope, slope), 0.0, (bundle,))
 
 
 @absorbed
 def _in_band(scene, v, z, sign):
     """Whether the contact counts as stuck: the guard of the region BAND is positive."""
-    return region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0
+    return region_guard(scene.law, *coefficients(scene, sign), v, z, sign, BAND) > 0.0
 
 
 @constant_step.initial_state.implements(BristleBelt)
@@ -68,7 +69,7 @@ def _slip_on_bristle_belt(scene, y, v, forcing, angle):
 def _begin_record_on_bristle_belt(scene, t, seen):
     """Implement :func:`recorder.begin`, for the speed and the distance at which bristles yield."""
     # The body moves so far while its bristles go from one largest deflection to the other.
-    length, _, recoil, _ = scales(scene.law, scene.mu_s, scene.body.gravity, scene.initial_z)
+    length, _, recoil, _ = scales(scene.law, along(scene.mu_s, 0.0), scene.body.gravity, scene.initial_z)
     return record_at_launch(scene, t, seen, stick_speed(scene.law, recoil), 2.0 * length)
 
 
@@ -111,7 +112,8 @@ def _after_guard_on_bristle_belt(scene, mode, guard, t, y):
         return SEPARATED_1, mode, y
     if guard == SLOW:
         return RUNNING, Mode(-mode.sign, BAND, -1, mode.place, ()), (x, 0.0, z)
-    z, region = after_yield(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
+    sign = float(mode.sign)
+    z, region = after_yield(scene.law, *coefficients(scene, sign), z, sign, mode.region)
     return RUNNING, Mode(mode.sign, region, -1, mode.place, ()), (x, v, z)
 
 
@@ -133,13 +135,13 @@ def _region_guards_on_bristle_belt(scene, mode, common, x):
     """Implement :func:`region_guards`: the sliding speed, m/s, and the guard of the bristles."""
     _, v, z = x
     sign = float(mode.sign)
-    return sign * v, region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, mode.region)
+    return sign * v, region_guard(scene.law, *coefficients(scene, sign), v, z, sign, mode.region)
 
 
 @implicit.error_scales.implements(BristleBelt)
 def _error_scales_on_bristle_belt(scene, tolerance, x):
     """Implement :func:`implicit.error_scales`, from the largest deflection that friction can hold."""
-    length, state, speed, friction = scales(scene.law, scene.mu_s, scene.body.gravity, x[2])
+    length, state, speed, friction = scales(scene.law, along(scene.mu_s, 0.0), scene.body.gravity, x[2])
     return (
         tolerance * (length_scale(scene, abs(x[1])) + length),
         tolerance * (abs(x[1]) + speed),

@@ -16,7 +16,7 @@ from ringsweep.physics.belt import OnBelt
 from ringsweep.physics.forces import force_in, force_rate, largest_force, load_rate
 from ringsweep.physics.friction.registry import dead_band
 from ringsweep.physics.friction.velocity import friction_at
-from ringsweep.physics.friction.ways import TwoWay, along
+from ringsweep.physics.friction.ways import TwoWay, along, facing
 
 
 @feature("no", of=ring.having(OnBelt, "force"), absorb=True)
@@ -86,7 +86,7 @@ def at_place(surface, scene, x, shift):
 @absorbed
 def coefficients(scene, way):
     """Static and kinetic friction coefficient in a direction; see :func:`ringsweep.physics.friction.ways.along`."""
-    return along(scene.mu_s, way), along(scene.mu_k, way)
+    return facing((scene.mu_s, scene.mu_k), way)
 
 
 @absorbed

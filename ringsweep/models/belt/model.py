@@ -27,17 +27,15 @@ from ringsweep.models.parts import (
     SPAN,
     by_formula,
     drive_of,
-    friction_coefficients,
     law_of,
     surface_from,
     table_of,
     zone_parameters,
 )
-from ringsweep.models.scene import WAYS, Structure, Values, require
+from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, forces, friction, ring, zones
 from ringsweep.physics.friction.presliding import bristle, steady_deflection
 from ringsweep.physics.friction.velocity import KINETIC, friction_at
-from ringsweep.physics.friction.ways import TwoWay
 from ringsweep.physics.functions_of_time import common_period
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.variables import Variable
@@ -104,8 +102,8 @@ class Belt(Model, Continues):
         """
         found = {"initial.x": ended["x_end"], "initial.velocity": ended["velocity_end"]}
         if "initial.deflection" in values:
-            most = _largest_deflection(structure, _on_incline(values))
-            found["initial.deflection"] = np.clip(ended["deflection_end"], -most, most)
+            low, high = _extreme_deflections(structure, _on_incline(values))
+            found["initial.deflection"] = np.clip(ended["deflection_end"], low, high)
         if friction.TRAITS[structure.law_type].state == "contact_age" and "contact_age_end" in ended:
             found["initial.contact_age"] = ended["contact_age_end"]
         return found | phases(("force", "drive"), values, ended)
@@ -152,10 +150,8 @@ class Belt(Model, Continues):
             found |= zone_parameters(structure, zones.Stretch, "the rest")
             if structure.frame == "belt":
                 found["belt.period"] = _PERIOD
-        for name, p in friction.coefficients_of(law).items() if not structure.arcs else ():
-            path = f"friction.{name}"
-            both = {f"{path}.{way}": replace(p, long_name=f"{p.long_name}, sliding {way}") for way in WAYS}
-            found |= both if path in structure.two_way else {path: p}
+        else:
+            found |= {f"friction.{name}": p for name, p in friction.coefficients_of(law).items()}
         for name, p in declared(law).items():
             # Laws have stiffness and damping of the bristles per unit of load; a belt scene has them in N/m and N s/m.
             per_load = name.startswith("sigma") and friction.family_of(law) is friction.Dynamic
@@ -208,8 +204,8 @@ class Belt(Model, Continues):
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
         values = _on_incline(values)
         law = structure.law_type
-        surface, surfaces = _surface(structure, values) if structure.arcs else ((), _surfaces(structure, values))
-        mu_s, mu_k = surface.roughest if surface else surfaces[0] if len(surfaces) == 1 else map(TwoWay, *surfaces)
+        surface, surfaces = _surface(structure, values)
+        mu_s, mu_k = zones.roughest(surface)
         drive = self._drive(structure, values)
         sliding = np.zeros(len(values["time.span"]))
         if "initial.velocity" in values:
@@ -230,7 +226,7 @@ class Belt(Model, Continues):
             "initial_x": values.get("initial.x", np.zeros(len(mass))),
             "initial_v": sliding,
             "span": values["time.span"],
-            "surface": surface,
+            "surface": surface if structure.arcs else (),
         }
         # A section may state a period of its own.
         period = np.broadcast_to(drives.period(forced), mass.shape)
@@ -267,14 +263,15 @@ class Belt(Model, Continues):
         }
         deflection = values.get("initial.deflection", np.zeros(len(mass)))
         if deflection.any():
-            most = _largest_deflection(structure, values)
-            beyond = np.flatnonzero(abs(deflection) > most * (1.0 + _LOOSEST))
-            if len(beyond):
-                given, limit = deflection[beyond[0]], most[beyond[0]]
-                problem = f"{given:.6g} m is not allowed: friction at rest holds bristles up to {limit:.6g} m"
-                raise InputError("scene.initial.deflection", problem)
+            low, high = _extreme_deflections(structure, values)
+            for bound, side in ((low, -1.0), (high, 1.0)):
+                beyond = np.flatnonzero(side * (deflection - bound * (1.0 + _LOOSEST)) > 0.0)
+                if len(beyond):
+                    given, limit = deflection[beyond[0]], bound[beyond[0]]
+                    problem = f"{given:.6g} m is not allowed: friction at rest holds bristles up to {limit:.6g} m"
+                    raise InputError("scene.initial.deflection", problem)
             # A run may end beyond the limit by its error.
-            deflection = np.clip(deflection, -most, most)
+            deflection = np.clip(deflection, low, high)
         fields["initial_z"] = deflection
         if friction.TRAITS[law].state == "contact_age":
             speed_0, distance = values["friction.reference_velocity"], values["friction.critical_distance"]
@@ -422,15 +419,16 @@ def _periods(structure: Structure, values: Values, period: NDArray[np.float64]) 
 
 
 def _surface(structure: Structure, values: Values) -> Any:
-    """Surface with zones, and the friction coefficients of all its parts."""
+    """Surface, and the friction coefficients of all its parts; see :func:`ringsweep.models.parts.surface_from`."""
     law, name = structure.law_type, structure.law
+    if structure.two_way and friction.TRAITS[law].snaps:
+        problem = f"not available with law {name}, whose bonds form alike both ways: give one number"
+        raise InputError(f"scene.{structure.two_way[0]}", problem)
+    if not structure.arcs:
+        return surface_from(structure, values, None)
     if friction.family_of(law) is friction.Dynamic or friction.TRAITS[law].dead_band:
         problem = f"not available with law {name}, whose friction is no function of place and speed alone"
         raise InputError(f"scene.{structure.arcs[0]}", problem)
-    if structure.two_way:
-        raise InputError(
-            f"scene.{structure.two_way[0]}", "cannot depend on the direction beside zones: give one number"
-        )
     if structure.steady:
         raise InputError("scene.initial.steady", "not available with zones: give initial.x and initial.velocity")
     period = None
@@ -458,26 +456,16 @@ def _among_zones(values: Values, drive: Any, forced: Any, period: NDArray[np.flo
     return np.broadcast_to(common_period(turn, period), period.shape)
 
 
-def _surfaces(structure: Structure, values: Values) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Static and kinetic friction coefficient; if some coefficient is given for both directions, for each of them."""
-    if not structure.two_way:
-        return [friction_coefficients(structure, "friction", values)]
-    if friction.family_of(structure.law_type) is friction.Dynamic:
-        problem = f"not available with law {structure.law}, whose contacts are alike both ways: give one number"
-        raise InputError(f"scene.{structure.two_way[0]}", problem)
-    of_ways = ({path: values[f"{path}.{way}"] for path in structure.two_way} for way in WAYS)
-    return [friction_coefficients(structure, "friction", {**values, **of_way}) for of_way in of_ways]
-
-
 def _point(structure: Structure) -> tuple[str, ...]:
     """Variables of a point of a section: displacement and velocity, and the state of a law with a memory."""
     return "x_section", "velocity_section", f"{friction.TRAITS[structure.law_type].state}_section"
 
 
-def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.float64]:
-    """Deflection at which the bristles carry the static friction, m."""
-    mu_s, _ = friction_coefficients(structure, "friction", values)
-    return mu_s * values["body.mass"] * values["gravity"] / values["friction.sigma0"]
+def _extreme_deflections(structure: Structure, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Deflections at which the bristles carry the static friction of a pull backwards and of one forwards, m."""
+    _, surfaces = _surface(structure, values)
+    per_mu = values["body.mass"] * values["gravity"] / values["friction.sigma0"]
+    return -surfaces[-1][0] * per_mu, surfaces[0][0] * per_mu
 
 
 class StopBelt(Belt):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from ringsweep.compile import feature, inlined
 from ringsweep.models.belt.force import (
     breakaway_force,
+    coefficients,
     direction,
     in_segment,
     moving,
@@ -40,7 +41,7 @@ def _in_space_on_belt(scene, t, y):
 @feature("()")
 def deflection_at_start(initial_z, scene):
     """Deflection of the bristles at t = 0, m. It also resets the memory that the law may have."""
-    return (initial_deflection(scene.law, scene.mu_s, scene.mu_k) + initial_z,)
+    return (initial_deflection(scene.law, *coefficients(scene, 0.0)) + initial_z,)
 
 
 @feature("()")

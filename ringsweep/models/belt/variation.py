@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ringsweep.compile import feature, hook
 from ringsweep.models import section, tangent
-from ringsweep.models.belt.force import in_segment, stuck_gradient, stuck_rates
+from ringsweep.models.belt.force import coefficients, in_segment, stuck_gradient, stuck_rates
 from ringsweep.models.belt.mode import FAST, SLOW, yields
 from ringsweep.models.belt.record import with_tangent
 from ringsweep.models.interface import variation
@@ -99,7 +99,8 @@ def _gradient_on_bristle_belt(scene, mode, guard, t, y, rates):
     _, v, z = y
     by_v, by_z = 1.0, 0.0
     if guard == FAST:
-        law, mu_s, mu_k, sign, region = scene.law, scene.mu_s, scene.mu_k, float(mode.sign), mode.region
+        law, sign, region = scene.law, float(mode.sign), mode.region
+        mu_s, mu_k = coefficients(scene, sign)
         _, state, speed, _ = scales(law, mu_s, scene.body.gravity, z)
         dv, dz = _SMALL * speed, _SMALL * state
         above = region_guard(law, mu_s, mu_k, v + dv, z, sign, region)

@@ -24,6 +24,7 @@ from ringsweep.models.sliding import REACTION_TOLERANCE, audited, imbalances, la
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.velocity import friction_at
+from ringsweep.physics.friction.ways import TwoWay, along, facing
 from ringsweep.physics.zones import Segments, edge_ahead, roughest
 from ringsweep.quantities.flags import SEPARATING
 
@@ -40,7 +41,8 @@ def _names_wrong_segment(scene, mode, rho, under):
 
     `under` has the coefficients under the contacts, as :func:`ring.coefficients_at` returns them.
     """
-    of_mode = coefficients_under(scene, mode)
+    way = float(mode.sign)
+    of_mode, under = facing(coefficients_under(scene, mode), way), facing(under, way)
     offset = ring.contact_offset(scene.body)
     wrong = False
     for place, angle, assumed, found in (
@@ -62,17 +64,16 @@ def _violation_on_ring(scene, mode, forcing, y, rates, s, tolerance):
     omega = v / body.radius + ring_omega
     motion = sin(phi), cos(phi), omega
     under = ring.coefficients_at(scene, phi - theta)
-    mu_s1, mu_k1, mu_s2, mu_k2 = under
     largest = inf if _names_wrong_segment(scene, mode, phi - theta, under) else 0.0
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
     speed = body.radius * (rate_at_rest(scene) + abs(omega))
     if mode.sign == 0:
-        kappa, reserve, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, motion, ring_epsilon)
-        K1, K2 = -kappa * mu_s1, -kappa * mu_s2
+        kappa, reserve, normal_1, normal_2 = contact.stick(body, under[0], under[2], motion, ring_epsilon)
+        K1, K2 = -kappa * along(under[0], kappa), -kappa * along(under[2], kappa)
         largest, relaxation = larger(largest, -reserve / (body.mass * terms * REACTION_TOLERANCE * tolerance)), 0.0
     else:
         sign = 1.0 if v > 0.0 else -1.0
-        mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), (mu_s1, mu_k1, mu_s2, mu_k2))
+        mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), facing(under, sign))
         K1, K2 = -sign * mu_1, -sign * mu_2
         _, determinant = ring.acceleration(body, K1, K2, motion)
         normal_1, normal_2 = ring.reactions(body, K1, K2, motion)
@@ -100,7 +101,7 @@ def _audited_on_bristle_ring(scene, mode, forcing, y):
     rho, v, _, _ = y
     body, phi, omega = scene.body, rho + forcing[0], v / scene.body.radius + forcing[1]
     under, sign = ring.coefficients_at(scene, rho), 1.0 if v >= 0.0 else -1.0
-    now = slip_of(scene, under, (sin(phi), cos(phi), omega), y, sign, mode.region)
+    now = slip_of(scene, facing(under, sign), (sin(phi), cos(phi), omega), y, sign, mode.region)
     terms = body.gravity + body.radius * (omega * omega + abs(forcing[2]))
     return now, terms, inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
 
@@ -168,6 +169,7 @@ def _is_near_another_regime(batch, a, b, fall_rates):
     # A reaction that falls slowly may rise again before it vanishes. Its second derivative is at most about that of the
     # weight of a body that swings or revolves, plus that of the centrifugal load, which friction changes.
     mu, _ = roughest(batch.surface)
+    mu = np.maximum(*mu) if isinstance(mu, TwoWay) else mu
     friction_term = np.minimum(1.0, 4.0 * mu * mu) * body.radius * omega_squared * omega_squared
     curvature = body.mass * (body.gravity * (body.gravity / body.radius + omega_squared) + friction_term)
     found |= separating & moved & (_FALL_FACTOR * np.abs(a.t_separation - b.t_separation) * curvature > fall_rates)

@@ -18,7 +18,7 @@ from ringsweep.compile import absorbed, inlined
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
-from ringsweep.models.ring.contacts import coefficients_under, places_after_edge
+from ringsweep.models.ring.contacts import coefficients_in_slip, places_after_edge
 from ringsweep.models.ring.series import (
     DETERMINANT,
     FAST,
@@ -40,6 +40,7 @@ from ringsweep.numerics.functions import select, sine_cosine_from
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.bristles import region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
+from ringsweep.physics.friction.ways import along, facing
 from ringsweep.physics.ring import BristleRing
 from ringsweep.physics.zones import roughest
 
@@ -52,7 +53,7 @@ def slip_of(scene, under, motion, x, sign, region):
     ----------
     scene : BristleRing
     under : tuple of float
-        Coefficients under the contacts, as ``coefficients_under`` returns them.
+        Coefficients under the contacts, as ``coefficients_in_slip`` returns them.
     motion : tuple of float
         As for :func:`ringsweep.physics.ring.acceleration`.
     x : tuple of float
@@ -78,7 +79,8 @@ def _region_guard(scene, under, v, z_1, z_2, sign, region):
 def _initial_deflections(scene):
     """Deflections at launch, m."""
     v = ring.launch_velocity(scene) * scene.body.radius
-    mu_s1, mu_k1, mu_s2, mu_k2 = ring.coefficients_at(scene, scene.initial_phi - drives.turn(scene.drive, 0.0)[0])
+    rho = scene.initial_phi - drives.turn(scene.drive, 0.0)[0]
+    mu_s1, mu_k1, mu_s2, mu_k2 = facing(ring.coefficients_at(scene, rho), v)
     return steady_deflection(scene.law, mu_s1, mu_k1, v), steady_deflection(scene.law, mu_s2, mu_k2, v)
 
 
@@ -93,7 +95,8 @@ def _initial_state_on_bristle_ring(scene):
 def _slip_in_space_on_bristle_ring(scene, y, v, forcing, angle):
     """Implement :func:`slip_in_space`; what it adds to the slip is 1 if the body counts as stuck, else 0."""
     rho, _, z_1, z_2 = y[0] - forcing[0], y[1], y[2], y[3]
-    sign, under = select(v >= 0.0, 1.0, -1.0), ring.coefficients_at(scene, rho)
+    sign = select(v >= 0.0, 1.0, -1.0)
+    under = facing(ring.coefficients_at(scene, rho), sign)
     stuck = select(_region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0, 1.0, 0.0)
     return slip_of(scene, under, (*angle, y[1]), (rho, v, z_1, z_2), sign, BAND), stuck
 
@@ -112,7 +115,7 @@ def _begin_on_bristle_ring(scene):
         epsilon, _ = ring.acceleration(scene.body, *K, motion)
         mode = with_slip(mode, 1 if epsilon > drives.turn(scene.drive, t)[2] else -1, BAND, -1)
     mode = slipping(scene, mode, rho, (mode.sign, BAND, -1))
-    if not _region_guard(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), BAND) > 0.0:
+    if not _region_guard(scene, coefficients_in_slip(scene, mode), v, z_1, z_2, float(mode.sign), BAND) > 0.0:
         mode = with_slip(mode, mode.sign, KINETIC, -1)
     return t, y, after_jump(scene, mode, t, y), mode
 
@@ -164,7 +167,7 @@ def _region_guards_on_bristle_ring(scene, mode, common, x):
 @implicit.error_scales.implements(BristleRing)
 def _error_scales_on_bristle_ring(scene, tolerance, x):
     """Implement :func:`implicit.error_scales`, from the largest deflection that friction can hold."""
-    mu, _ = roughest(scene.surface)
+    mu = along(roughest(scene.surface)[0], 0.0)
     deflection = mu / scene.law.sigma0
     # Without gravity the load is that of a slow rotation.
     load = scene.body.gravity + scene.body.radius * rate_at_rest(scene) ** 2

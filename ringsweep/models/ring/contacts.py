@@ -9,6 +9,7 @@ from __future__ import annotations
 from ringsweep.compile import inlined
 from ringsweep.physics import ring
 from ringsweep.physics.friction.velocity import friction_in
+from ringsweep.physics.friction.ways import facing
 from ringsweep.physics.zones import coefficients, cross_edge, edge_ahead, leave_edge, locate
 
 
@@ -47,10 +48,16 @@ def places_after_edge(scene, mode, rho):
 
 @inlined
 def coefficients_under(scene, mode):
-    """``(mu_s1, mu_k1, mu_s2, mu_k2)`` in the segments that a mode names."""
+    """``(mu_s1, mu_k1, mu_s2, mu_k2)`` in the segments that a mode names, in both directions if these differ."""
     mu_s1, mu_k1, _ = coefficients(scene.surface, mode.place_1[0])
     mu_s2, mu_k2, _ = coefficients(scene.surface, mode.place_2[0])
     return mu_s1, mu_k1, mu_s2, mu_k2
+
+
+@inlined
+def coefficients_in_slip(scene, mode):
+    """``(mu_s1, mu_k1, mu_s2, mu_k2)`` in the segments that a mode names, and in the direction of its slip."""
+    return facing(coefficients_under(scene, mode), float(mode.sign))
 
 
 @inlined
@@ -62,5 +69,5 @@ def zones_of(scene, place_1, place_2):
 @inlined
 def friction_under(scene, mode, speed):
     """Friction ``(K1, K2)`` per unit of each reaction in slip, at the sliding speed `speed`, m/s."""
-    mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, speed, coefficients_under(scene, mode))
+    mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, speed, coefficients_in_slip(scene, mode))
     return -mode.sign * mu_1, -mode.sign * mu_2

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
 from ringsweep.models.interface.shock import Located
-from ringsweep.models.ring.contacts import coefficients_under, edges_ahead
+from ringsweep.models.ring.contacts import coefficients_in_slip, edges_ahead
 from ringsweep.models.ring.record import extremes_of
 from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.numerics.functions import ROTATED, rotated, sine_cosine_from
@@ -51,7 +51,7 @@ class Common(NamedTuple):
 def _common_on_ring(scene, mode, forcing, x):
     """Implement :func:`implicit.common`."""
     phi = x[0] + forcing[0]
-    return Common(x[0], phi, sin(phi), cos(phi), 1.0 / scene.body.radius, coefficients_under(scene, mode))
+    return Common(x[0], phi, sin(phi), cos(phi), 1.0 / scene.body.radius, coefficients_in_slip(scene, mode))
 
 
 @slip.implements(ring.Ring)

@@ -25,6 +25,7 @@ from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.ring import long_run
 from ringsweep.models.ring.contacts import (
+    coefficients_in_slip,
     coefficients_under,
     edges_ahead,
     friction_under,
@@ -72,6 +73,7 @@ from ringsweep.physics.friction.velocity import (
     stiction_band,
     varies,
 )
+from ringsweep.physics.friction.ways import TwoWay, along, facing
 
 # Rows of the table of series. Those from KIND on belong to a body that may leave the race. KIND holds the code of the
 # state; GAP_1 and GAP_2 are ``(rho^2 - |c|^2)/(2 rho)``, a measure of the gap that has a series; ETA belongs to a
@@ -100,6 +102,9 @@ _LEAST_AT_FOLD = 1e-5
 # Near the instant at which both roots of the equation of stick meet, its series converge ever more slowly. A
 # discriminant below this share of its terms is zero.
 _LEAST_DISCRIMINANT = 1e-12
+
+# Regions of stick, by the pull on the body, where friction depends on the direction; else the region is KINETIC.
+FORWARD, BACKWARD = KINETIC + 1, KINETIC + 2
 
 #: Friction coefficients that differ by less than this share are equal.
 EQUAL = 1e-14
@@ -209,7 +214,7 @@ def slipping(scene, mode, rho, slip):
 @inlined
 def _at_breakaway(scene, mode):
     """Friction coefficients under contacts 1 and 2 as slip begins; static if the law does not drop there."""
-    mu_s1, _, mu_s2, _ = surfaces = coefficients_under(scene, mode)
+    mu_s1, _, mu_s2, _ = surfaces = coefficients_in_slip(scene, mode)
     mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, 0.0, surfaces)
     # Friction that does not drop at breakaway is static friction, without the rounding of the formula.
     return (
@@ -223,12 +228,13 @@ def _mode_at_rest(scene, mode, t, phi, stick_end):
     """Status and mode of a set-valued law at zero sliding velocity; see :func:`contact.at_rest` for `stick_end`."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     region = region_at(scene.law, 0.0)
-    stick = with_slip(mode, 0, KINETIC, -1)
+    motion = sin(phi), cos(phi), ring_omega
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    stick = with_slip(mode, 0, _region_of_stick(mu_s1, mu_s2, scene.body, motion, ring_epsilon), -1)
     forward = slipping(scene, mode, phi - theta, (1, region, SLOW))
     backward = slipping(scene, mode, phi - theta, (-1, region, SLOW))
-    mu_s1, _, mu_s2, _ = coefficients_under(scene, stick)
     breakaway = _at_breakaway(scene, forward), _at_breakaway(scene, backward)
-    problem = *breakaway, (sin(phi), cos(phi), ring_omega), ring_epsilon
+    problem = *breakaway, motion, ring_epsilon
     found = contact.at_rest(scene.body, (mu_s1, mu_s2), *problem, stick_end)
     if found == contact.IMPOSSIBLE:
         # A contact on an edge may belong to either side.
@@ -236,7 +242,8 @@ def _mode_at_rest(scene, mode, t, phi, stick_end):
             mu_s1, _, mu_s2, _ = coefficients_under(scene, slip)
             on_edge = slip.place_1 != mode.place_1 or slip.place_2 != mode.place_2
             if on_edge and contact.at_rest(scene.body, (mu_s1, mu_s2), *problem, 0) == contact.STICK:
-                return RUNNING, with_slip(slip, 0, KINETIC, -1)
+                region = _region_of_stick(mu_s1, mu_s2, scene.body, motion, ring_epsilon)
+                return RUNNING, with_slip(slip, 0, region, -1)
     if found == contact.FORWARD:
         return RUNNING, forward
     if found == contact.BACKWARD:
@@ -329,8 +336,8 @@ def _loads_as_stick_ends(scene, mode, t, y, first):
     body = scene.body
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    motion = sin(y[0]), cos(y[0]), ring_omega
-    normals = contact.loads_as_stick_ends(body, mu_s1, mu_s2, motion, ring_epsilon, first)
+    static, motion = facing((mu_s1, mu_s2), _pull_of(mu_s1, mode)), (sin(y[0]), cos(y[0]), ring_omega)
+    normals = contact.loads_as_stick_ends(body, *static, motion, ring_epsilon, first)
     return normals, body.mass * (body.gravity + body.radius * ring_omega * ring_omega)
 
 
@@ -340,7 +347,7 @@ def _status_when_stalled_on_ring(scene, mode, t, y):
     if mode.sign == 0:
         return BROKEN
     # Where friction changes fast with the speed, the determinant does not show the jam: test with static coefficients.
-    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    mu_s1, _, mu_s2, _ = coefficients_in_slip(scene, mode)
     _, determinant = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, (0.0, 1.0, 0.0))
     return JAM if is_jamming(scene, mode, t, y) or not determinant > 0.0 else BROKEN
 
@@ -363,9 +370,11 @@ def _switch_on_ring(scene, mode, guard, t, y):
     if guard == DETERMINANT:
         return JAM, mode, y
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    if _pull_turns(mu_s1, mode, guard):
+        return RUNNING, with_slip(mode, 0, FORWARD + BACKWARD - mode.region, SLOW + FAST - guard), y
     stick_end = 0
     if mode.sign == 0:
-        if guard == EDGE and contact.folds(scene.body, mu_s1, mu_s2):
+        if guard == EDGE and contact.folds(scene.body, *facing((mu_s1, mu_s2), _pull_of(mu_s1, mode))):
             (normal_1, normal_2), scale = _loads_as_stick_ends(scene, mode, t, y, True)
             if min(normal_1, normal_2) <= _LEAST_AT_FOLD * scale:
                 return _separated(scene.body, (normal_1, normal_2), scale, normal_1 <= normal_2), mode, y
@@ -373,7 +382,7 @@ def _switch_on_ring(scene, mode, guard, t, y):
     else:
         if guard == EDGE:
             mode = with_places(mode, *places_after_edge(scene, mode, phi - drives.turn(scene.drive, t)[0]))
-        mode, v = slip_after(scene.law, mode, guard, v, mu_s1 + mu_s2)
+        mode, v = slip_after(scene.law, mode, guard, v, along(mu_s1, 0.0) + along(mu_s2, 0.0))
     if mode.sign == 0:
         status, mode = _mode_at_rest(scene, mode, t, phi, stick_end)
         return status, mode, (phi, 0.0)
@@ -443,7 +452,7 @@ def _expand_slip_of_varying_friction(law, scene, mode, c):
     body = scene.body
     sign = float(mode.sign)
     speed = sign * body.radius
-    surfaces = coefficients_under(scene, mode)
+    surfaces = coefficients_in_slip(scene, mode)
     omega_0 = c[OMEGA, 0]
     sin_0, cos_0, square_0 = sin(c[PHI, 0]), cos(c[PHI, 0]), omega_0 * omega_0
     (mu_1, mu_2), begun, sharpness = begin_series(scene.law, mode.region, sign * c[V, 0], surfaces)
@@ -490,7 +499,7 @@ def _expand_slip_of_varying_friction(law, scene, mode, c):
 def _expand_slip_of_constant_friction(law, scene, mode, c):
     """As :func:`_expand_slip`, if friction does not depend on the sliding velocity."""
     body, sign = scene.body, float(mode.sign)
-    mu_1, mu_2, _, _ = friction_in(law, mode.region, sign * c[V, 0], coefficients_under(scene, mode))
+    mu_1, mu_2, _, _ = friction_in(law, mode.region, sign * c[V, 0], coefficients_in_slip(scene, mode))
     K1, K2 = -sign * mu_1, -sign * mu_2
     acceleration, reaction_1, reaction_2 = ring.slip_balance(body, K1, K2)
     c[SIN, 0], c[COS, 0] = sin(c[PHI, 0]), cos(c[PHI, 0])
@@ -536,9 +545,12 @@ def _expand_stick(scene, mode, tolerance, c):
 
     The guards are the reactions; the reserves of friction, N, before forward slip (SLOW) and before backward slip
     (FAST), see :func:`contact.sharing`; and for two contacts EDGE, the discriminant of the quadratic equation, or the
-    factor of a linear one. With one contact EDGE is infinite.
+    factor of a linear one. With one contact EDGE is infinite. If friction depends on the direction, the pull stands in
+    place of the reserve against it.
     """
-    body, (m1, _, m2, _) = scene.body, coefficients_under(scene, mode)
+    body, (mu_s1, _, mu_s2, _) = scene.body, coefficients_under(scene, mode)
+    m1, m2 = facing((mu_s1, mu_s2), _pull_of(mu_s1, mode))
+    (ahead_1, ahead_2), (back_1, back_2) = facing((mu_s1, mu_s2), 1.0), facing((mu_s1, mu_s2), -1.0)
     by_F2, omega_0 = contact.by_friction(body), c[THETA, 1]
     sin_0, cos_0 = sin(c[PHI, 0]), cos(c[PHI, 0])
     before = first_N2 = first_F1 = first_linear = first_F2 = 0.0
@@ -557,7 +569,7 @@ def _expand_stick(scene, mode, tolerance, c):
             c[PHI, k] = c[THETA, k]
         at_zero = ring.held(body, one, (sine, cosine, omega), square, epsilon, 0.0)
         N1, N2, F1 = at_zero
-        F2, linear, normals, friction, capacity = 0.0, 0.0, (N1, N2), F1, m1 * N1
+        F2, linear, normals, friction, ahead, back = 0.0, 0.0, (N1, N2), F1, ahead_1 * N1, back_1 * N1
         if ring.contact_count(body) == 2:
             quadratic, linear, _ = contact.sharing(m1, m2, at_zero, by_F2)
             # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
@@ -575,7 +587,8 @@ def _expand_stick(scene, mode, tolerance, c):
                 # An equation that is linear leaves the share open where its factor vanishes.
                 c[EDGE, k] = -linear
             normal_1, normal_2, friction = contact.at(F2, at_zero, by_F2)
-            normals, capacity = (normal_1, normal_2), m1 * normal_1 + m2 * normal_2
+            normals = normal_1, normal_2
+            ahead, back = ahead_1 * normal_1 + ahead_2 * normal_2, back_1 * normal_1 + back_2 * normal_2
         if k > 0:
             left, right = (before, before, omega, F1, linear, linear, F2), (cosine, sine, omega, N2, linear, F2, F2)
             newest = set_factors(c, FACTORS, k, left, right)
@@ -583,13 +596,52 @@ def _expand_stick(scene, mode, tolerance, c):
         c[V, k], c[OMEGA, k], c[EPSILON, k] = 0.0, omega, epsilon
         c[SIN, k], c[COS, k], c[SQUARE, k] = sine, cosine, square
         c[NORMAL_1, k], c[NORMAL_2, k] = normals
-        c[SLOW, k], c[FAST, k] = capacity + friction, capacity - friction
+        c[SLOW, k], c[FAST, k] = _reserves(mu_s1, mode, ahead, back, friction)
         before = omega
+    _begin_pull(mu_s1, mode, c)
     per_angle = 1.0 / tolerance
     per_load = per_angle / (body.mass * (body.gravity + body.radius * c[SQUARE, 0]))
     units = (PHI, per_angle), (SIN, per_angle), (COS, per_angle), (SLOW, per_load), (FAST, per_load)
     h = step_within(c, units)
     return h, h
+
+
+@feature("ahead + friction, back - friction", of=TwoWay)
+def _reserves(mu_s, mode, ahead, back, friction):
+    """Coefficients of the guards SLOW and FAST in stick; `ahead` and `back` are most friction against each slip, N."""
+    slow = friction if mode.region == BACKWARD else ahead + friction
+    return slow, -friction if mode.region == FORWARD else back - friction
+
+
+@feature("None", of=TwoWay)
+def _begin_pull(mu_s, mode, c):
+    """Make a pull that has just turned begin with zero, and one that never begins no guard."""
+    row = FAST if mode.region == FORWARD else SLOW
+    if mode.region != KINETIC and mode.entry_guard == row:
+        c[row, 0] = 0.0
+    elif mode.region != KINETIC and not c[row].any():
+        c[row, 0] = 1.0
+
+
+@feature("KINETIC", of=TwoWay)
+def _region_of_stick(mu_s1, mu_s2, body, motion, epsilon):
+    """Region of stick: FORWARD or BACKWARD if the direction of the pull changes how two contacts share it."""
+    alike = mu_s1.forward * mu_s2.backward == mu_s1.backward * mu_s2.forward
+    if alike or ring.contact_count(body) == 1:
+        return KINETIC
+    return FORWARD if ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0)[2] <= 0.0 else BACKWARD
+
+
+@feature("0.0", of=TwoWay)
+def _pull_of(mu_s, mode):
+    """Direction in which a stuck body is pulled, 1 or -1, if that matters for its contacts; else 0."""
+    return 1.0 if mode.region == FORWARD else -1.0 if mode.region == BACKWARD else 0.0
+
+
+@feature("False", of=TwoWay)
+def _pull_turns(mu_s, mode, guard):
+    """Whether the event is that the pull on a stuck body changes its sign."""
+    return mode.sign == 0 and guard == (FAST if mode.region == FORWARD else SLOW) and mode.region != KINETIC
 
 
 @series.seen_at_start.implements(ring.Ring)

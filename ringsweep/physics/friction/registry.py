@@ -60,6 +60,9 @@ class Traits:
 
 MU_0 = Parameter("1", "friction coefficient of steady sliding at the reference velocity", lower=0.0, open_lower=True)
 
+#: Names of the coefficients of a surface. Each may be given for both directions of sliding.
+SURFACE = ("mu_s", "mu_k", "scale", "mu0")
+
 #: Laws by the name that the configuration gives them.
 LAWS: dict[str, type] = {}
 

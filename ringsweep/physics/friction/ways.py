@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ringsweep.compile import feature
+from ringsweep.compile import feature, unrolled
 from ringsweep.numerics.functions import select
-from ringsweep.quantities.parameters import Leaf
 
 
 class TwoWay(NamedTuple):
-    """Friction coefficient of a body that slides forwards, and of one that slides backwards, 1."""
+    """Friction coefficient of a body that slides forwards, and of one that slides backwards, 1.
 
-    forward: Leaf
-    backward: Leaf
+    On a surface with zones each of them is that of all segments.
+    """
+
+    forward: Any
+    backward: Any
 
 
 @feature("mu", of=TwoWay, absorb=True)
@@ -28,3 +30,9 @@ def along(mu, way):
     """
     either = max(mu.forward, mu.backward)
     return select(way > 0.0, mu.forward, select(way < 0.0, mu.backward, either))
+
+
+@unrolled
+def facing(count, coefficients, way):
+    """Friction coefficients, a tuple, in a direction; see :func:`along`."""
+    return ["return (" + "".join(f"along(coefficients[{i}], way), " for i in range(count)) + ")"]

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ringsweep.errors import InputError
 from ringsweep.models.ring import record as of_ring
 from ringsweep.models.ring.impact.record import OUTCOMES
 from ringsweep.models.ring.impact.rows import EVENT, HISTORY
@@ -49,6 +50,9 @@ class SingleContactImpact(SingleContactRing):
 
     def build(self, structure: Structure, values: Values) -> Any:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
+        if structure.two_way:
+            path = f"scene.{structure.two_way[0]}"
+            raise InputError(path, "cannot depend on the direction beside impact: give one number, or leave impact out")
         closed: Any = super().build(replace(structure, impact=False), values)
         balls = self.balls(values, closed.body)
         return ImpactRing(
