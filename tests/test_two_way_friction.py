@@ -70,6 +70,12 @@ def test_two_equal_numbers_are_one_number():
     xr.testing.assert_identical(*(run.drop_attrs() for run in runs))
 
 
+def test_setting_one_way_of_a_number_leaves_the_other_way_as_it_is():
+    number, pair = ({"law": "stiction", "mu_s": mu_s, "mu_k": 0.2} for mu_s in (0.3, {"forward": 0.5, "backward": 0.3}))
+    run = ringsweep.simulate(conveyor(number), set={"friction.mu_s.forward": 0.5})
+    assert run.x_end.item() == ringsweep.simulate(conveyor(pair)).x_end.item()
+
+
 @pytest.mark.slow
 def test_two_equal_numbers_are_one_number_in_a_zone_of_a_ring():
     rough, found = ({"mu_s": 0.4, "mu_k": 0.3}, {"mu_s": 0.4, "mu_k": {"forward": 0.3, "backward": 0.3}}), []

@@ -21,7 +21,8 @@ from ringsweep.config.sections import suggestion, warn_once
 from ringsweep.config.uncertain import Sample, read_sample
 from ringsweep.config.yaml_text import Document, Source, scalar
 from ringsweep.errors import InputError
-from ringsweep.models.scene import ELSEWHERE, LAW, Scene
+from ringsweep.models.scene import ELSEWHERE, LAW, WAYS, Scene
+from ringsweep.physics.friction.registry import SURFACE
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, other_unit, show
 from ringsweep.quantities.variables import written
@@ -288,7 +289,10 @@ def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
         if isinstance(node, dict) and key not in node:
             node[key] = {}
             doc.locations[".".join(parents[:depth])] = told
-        node = _child(node, key, full)
+        section, node = node, _child(node, key, full)
+    if last in WAYS and parents[-1] in SURFACE and not isinstance(node, dict):
+        # A number that stands for both directions of sliding.
+        node = section[parents[-1]] = dict.fromkeys(WAYS, node)
     before = node.get(last) if isinstance(node, dict) else _child(node, last, full)
     place: Any = last if isinstance(node, dict) else int(last)
     node[place] = value
