@@ -121,6 +121,16 @@ def test_history_tells_the_zone_and_the_edges():
     assert edges == pytest.approx([(2.0 - before) / 0.1 / G, (2.0 - before) / 0.1 / G + (before - after) / 0.4 / G])
 
 
+def test_a_run_that_goes_on_finds_the_zones_where_the_belt_has_carried_them(tmp_path):
+    zones = [(0.2, 0.15, 0.6, 0.3), (-0.3, 0.1, 0.1, 0.05)]
+    scene = with_zones(zones, (0.4, 0.25), period=1.3, stiffness=8.0, velocity=0.3, force=(3.0, 0.4), start=(0.1, 0.3))
+    whole, first = outcome(scene | {"time": {"span": 4.0}}), tmp_path / "first.nc"
+    ringsweep.run({"scene": scene | {"time": {"span": 2.3}}}, first, jobs=1, progress=False).close()
+    del scene["initial"]
+    rest = outcome(scene | {"initial": {"from": str(first)}, "time": {"span": 1.7}})
+    np.testing.assert_allclose([rest.x_end, rest.velocity_end], [whole.x_end, whole.velocity_end], atol=1e-9)
+
+
 def kinds(run):
     """Words of the events of a run."""
     names = dict(zip(run.event_kind.attrs["flag_values"], run.event_kind.attrs["flag_meanings"].split(), strict=True))

@@ -87,6 +87,7 @@ def put_state(doc: Document, scene: Scene, file: str, before: Any, swept: Collec
         ended |= {name: np.ma.filled(content[name][:], np.nan).astype(float).ravel() for name in names}
         if not all(np.isfinite(ended[name]).all() for name in names):
             raise ValueError("a state has finite numbers")
+    _move_zones(doc, scene, ended, swept)
     values = {path: np.full(1, scene.values.get(path, np.nan)) for path in {**scene.values, **dict.fromkeys(swept)}}
     found = model.continued(scene.structure, values, ended)
     # What is too long for the bristles of this scene is an error in its place.
@@ -97,3 +98,21 @@ def put_state(doc: Document, scene: Scene, file: str, before: Any, swept: Collec
         if path in swept or name in given:
             raise InputError(f"scene.{path}", _BESIDE)
         given[name] = float(value)
+
+
+def _move_zones(doc: Document, scene: Scene, ended: dict[str, Any], swept: Collection[str]) -> None:
+    """Put zones that ring or belt has carried along at constant speed where they are at the end of the run in a file.
+
+    The run that goes on counts the way of ring or belt from 0 again.
+    """
+    structure = scene.structure
+    speed = ended.get("belt.velocity", ended.get("drive.amplitude", 0.0) if structure.drive == "constant" else 0.0)
+    way = float(np.ravel(speed * ended["t_end"])[0])
+    for arc in structure.arcs if structure.frame == "belt" and way != 0.0 else ():
+        if f"{arc}.center" in swept:
+            raise InputError(f"scene.{arc}.center", _BESIDE)
+        name, _, number = arc.partition(".")
+        zone = doc.tree["scene"][name]
+        center = scene.values[f"{arc}.center"] + way
+        zone = zone[int(number)] if number else zone
+        zone["center"] = center if structure.model == "belt" else center % (2.0 * np.pi)
