@@ -121,7 +121,7 @@ def test_history_tells_the_zone_and_the_edges():
     assert edges == pytest.approx([(2.0 - before) / 0.1 / G, (2.0 - before) / 0.1 / G + (before - after) / 0.4 / G])
 
 
-def test_a_run_that_goes_on_finds_the_zones_where_the_belt_has_carried_them(tmp_path):
+def test_a_run_that_goes_on_finds_the_zones_where_they_are_by_then(tmp_path):
     zones = [(0.2, 0.15, 0.6, 0.3), (-0.3, 0.1, 0.1, 0.05)]
     scene = with_zones(zones, (0.4, 0.25), period=1.3, stiffness=8.0, velocity=0.3, force=(3.0, 0.4), start=(0.1, 0.3))
     whole, first = outcome(scene | {"time": {"span": 4.0}}), tmp_path / "first.nc"
@@ -161,7 +161,7 @@ def test_mistakes_are_located(change, words):
 
 
 @pytest.mark.parametrize("load", [None, {"formula": "Q*sin(u*t)", "Q": "1 N", "u": f"{np.pi} rad/s"}])
-def test_a_rocking_belt_with_zones_has_the_period_that_force_and_load_share_with_it(load):
+def test_a_rocking_belt_with_zones_shares_its_period_with_force_and_load(load):
     scene = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), force=(1.0, 0.5))
     scene["belt"].pop("velocity")
     scene["drive"] = {"law": "sinusoidal", "amplitude": 0.1, "frequency": 1.5}

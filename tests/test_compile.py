@@ -37,7 +37,7 @@ class Spring(NamedTuple):
     stiffness: float
 
 
-def test_an_array_that_stands_in_a_batch_twice_is_still_one_in_some_of_its_cells():
+def test_an_array_that_stands_in_a_batch_twice_stays_one_in_some_cells():
     stiffness = np.arange(6.0).reshape(3, 2)
     one, (other,) = take((Spring(stiffness), (Spring(stiffness),)), np.array([0, 2]))
     assert one.stiffness is other.stiffness

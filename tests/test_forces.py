@@ -337,7 +337,7 @@ class TestLinearisation:
         of_law = {"v0": 0.1} if law == "bengisu-akay" else {"sigma0": 30.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.1}
         scene["friction"] |= of_law
         cell = cell_of(scene)
-        mode = Mode(1, BAND if law == "bengisu-akay" else KINETIC, -1, ())
+        mode = Mode(1, BAND if law == "bengisu-akay" else KINETIC, -1, (), ())
         t, x = 0.6, (0.4, 0.05, 0.003)[: 2 if law == "bengisu-akay" else 3]
 
         def rates(t, x):
@@ -368,7 +368,7 @@ class TestAudit:
         x, v = 0.3, 0.7
         push = 1.5 * sin(0.6 * pi * t) + error
         rate = -x - 2.0 * x**3 - 0.5 * (v + 0.1) + push - 0.4
-        found, power = audit.violation(scene, Mode(1, KINETIC, -1, ()), forcing, (x, v), (v + 0.1, rate), 0.1, 1e-10)
+        found, power = audit.violation(scene, Mode(1, KINETIC, -1, (), ()), forcing, (x, v), (v + 0.1, rate), 0.1, 1e-10)
         assert power == pytest.approx((v + 0.1) * (push - error - 0.4 - 0.5 * (v + 0.1)), rel=1e-12)
         return found
 
@@ -386,7 +386,7 @@ class TestAudit:
     @pytest.mark.slow
     def test_work_of_a_wrong_force_does_not_explain_the_energy(self):
         """A series about a wrong time has a wrong force."""
-        scene, mode, y = self.cell(), Mode(1, KINETIC, -1, ()), (0.3, 0.7)
+        scene, mode, y = self.cell(), Mode(1, KINETIC, -1, (), ()), (0.3, 0.7)
         audits = []
         for late in (0.0, 0.01):
             c = np.zeros((series.table_shape(scene)[0], COLUMNS))
