@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ringsweep.config.sections import Key, Keys, choose, one_of, read_keys, read_values, section_of
+from ringsweep.config.sections import Key, Keys, choose, one_of, read_keys, read_values, section_of, warn_once
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name, shortened
 from ringsweep.models import MODELS
@@ -255,6 +255,9 @@ INTERPOLATIONS["body.load"] = INTERPOLATIONS["force"]
 #: Keys of a section that stand for a table, by section.
 TABLE_KEYS = {of: (*columns, "file", *["interpolate"] * (of in INTERPOLATIONS)) for of, columns in TABLES.items()}
 
+# Share of the range of a table that a spline through it may leave; a sine with six rows a period leaves less.
+_OVERSHOOT = 0.1
+
 _PLURAL = {"time": "times", "theta": "angles", "force": "forces", "load": "loads", "v": "speeds", "mu": "coefficients"}
 
 
@@ -271,7 +274,20 @@ def read_samples(doc: Document, given: dict[str, Any], section: str) -> tuple[Fl
             ": its place must not jump; for steps of its velocity give `law: formula` with velocity: piecewise(...)"
         )
     interpolate = one_of(given.get("interpolate", next(iter(known))), known, where, problem)
-    return *read_table(doc, given, section, 4 if interpolate == "spline" else 2), interpolate
+    times, samples = read_table(doc, given, section, 4 if interpolate == "spline" else 2)
+    if interpolate == "spline":
+        _warn_of_overshoot(times, samples, section)
+    return times, samples, interpolate
+
+
+def _warn_of_overshoot(times: NDArray[np.float64], samples: NDArray[np.float64], section: str) -> None:
+    from scipy.interpolate import CubicSpline
+
+    between = CubicSpline(times, samples)(times[:-1] + np.diff(times) * np.linspace(0.0, 1.0, 9)[:, None])
+    beyond = max(np.max(between) - np.max(samples), np.min(samples) - np.min(between))
+    if beyond > _OVERSHOOT * np.ptp(samples):
+        cure = "`interpolate: monotone` stays between rows"
+        warn_once(f"scene.%s: the spline leaves the range of its table by %.3g; {cure}", section, beyond)
 
 
 def read_table(doc: Document, given: dict[str, Any], section: str, least: int) -> tuple[Floats, Floats]:
