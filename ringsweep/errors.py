@@ -58,7 +58,7 @@ class InputError(ValueError):
     ...     ringsweep.run({"scene": {"model": "bealt"}})
     ... except ringsweep.InputError as error:
     ...     print(error.path, "|", error.problem)
-    scene.model | 'bealt' is not a model; did you mean `belt`? (known: ring, ring-single-contact, belt)
+    scene.model | 'bealt' is not a model; did you mean `belt`? (known: ring, ring-single-contact, belt, belt-pair)
     """
 
     def __init__(self, path: str, problem: str, *, file: str | None = None, line: int | None = None):

@@ -368,7 +368,8 @@ class TestAudit:
         x, v = 0.3, 0.7
         push = 1.5 * sin(0.6 * pi * t) + error
         rate = -x - 2.0 * x**3 - 0.5 * (v + 0.1) + push - 0.4
-        found, power = audit.violation(scene, Mode(1, KINETIC, -1, (), ()), forcing, (x, v), (v + 0.1, rate), 0.1, 1e-10)
+        mode = Mode(1, KINETIC, -1, (), ())
+        found, power = audit.violation(scene, mode, forcing, (x, v), (v + 0.1, rate), 0.1, 1e-10)
         assert power == pytest.approx((v + 0.1) * (push - error - 0.4 - 0.5 * (v + 0.1)), rel=1e-12)
         return found
 

@@ -280,7 +280,7 @@ def read_samples(doc: Document, given: dict[str, Any], section: str) -> tuple[Fl
     return times, samples, interpolate
 
 
-def _warn_of_overshoot(times: NDArray[np.float64], samples: NDArray[np.float64], section: str) -> None:
+def _warn_of_overshoot(times: Floats, samples: Floats, section: str) -> None:
     from scipy.interpolate import CubicSpline
 
     between = CubicSpline(times, samples)(times[:-1] + np.diff(times) * np.linspace(0.0, 1.0, 9)[:, None])

@@ -31,6 +31,7 @@ class System:
     """
 
     def __init__(self, fields: Sequence[str], motion: Sequence[str], balances: Sequence[str]):
+        """Read the balances, and name the unknowns of each contact."""
         self.motion, self._fields, self._texts = motion, fields, balances
         numbers = range(1, len(balances) // 2 + 1)
         self._w, self._N, self._F, self._K = ([f"{letter}_{i}" for i in numbers] for letter in "wNFK")
