@@ -90,7 +90,7 @@ def plain(node):
 
 def script(page):
     """What the script of a page works with."""
-    (found,) = (one for one in models(page, "CustomJS") if "cells" in str(one["args"])[:100_000])
+    (found,) = (one for one in models(page, "CustomJS") if "cells" in str(one["args"]))
     args = dict(found["args"]["entries"]) if "entries" in found["args"] else found["args"]
     names = ("cells", "variables", "coordinates", "columns", "rows", "size", "edges")
     values = {name: plain(args[name]) for name in names}
