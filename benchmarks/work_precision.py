@@ -318,7 +318,7 @@ def measure(scene: Scene, effort: Effort) -> tuple[xr.Dataset, list[str]]:
     """Times and errors of every contender of a scene, and notes on the reference and on absent peers."""
     exact, agreement = reference(scene, scene.cells(effort.cells), effort)
     entered, skipped = contenders(scene, effort)
-    data = compete(entered, exact, scene.place, effort.rounds).assign_attrs(title=scene.title)
+    data = compete(entered, exact, f"{scene.place}_end", effort.rounds).assign_attrs(title=scene.title)
     return data, [agreement, *(f"Left out: {words}." for words in skipped)]
 
 

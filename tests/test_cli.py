@@ -377,7 +377,7 @@ def test_init_writes_a_valid_configuration_and_replaces_no_file(folder, capsys, 
     with pytest.raises(SystemExit):
         main(["init", "--help"])
     words = " ".join(capsys.readouterr().out.split())
-    assert re.search(rf"\b{model}: (a drum|two balls|a mass on a spring)", words)
+    assert re.search(rf"\b{model}: (a drum|two balls|a mass on a spring|two coupled masses)", words)
 
 
 def test_help_tells_the_exit_status_and_its_examples_parse(capsys):

@@ -33,6 +33,7 @@ def build_parser() -> argparse.ArgumentParser:
         entries, commands.init_command, "config NEW.yaml", f"default: {first}", nargs="?", default=first
     )
     models = {"ring": "two balls (default)", "ring-single-contact": "a drum", "belt": "a mass on a spring"}
+    models |= {"belt-pair": "two coupled masses on a belt"}
     _option(init, "--model", "; ".join(map(": ".join, models.items())), choices=list(models), default="ring")
 
     run = _add_command(entries, commands.run_command, "config CONFIG.yaml", "or OUT.nc, whose sweep is repeated")

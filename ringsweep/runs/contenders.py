@@ -111,7 +111,7 @@ def alternate(
 def compete(
     contenders: Sequence[Contender],
     exact: Answer,
-    place: str,
+    place_end: str,
     rounds: int,
     read: Callable[[Any], Answer] = lambda result: Answer(*result),
     **options: Any,
@@ -123,8 +123,8 @@ def compete(
     contenders : sequence of Contender
     exact : Answer
         That of the reference, in all cells.
-    place : str
-        Name of what :attr:`Answer.end` is the value of, such as ``"phi"``.
+    place_end : str
+        Outcome of which :attr:`Answer.end` is the value, such as ``"phi_end"``.
     rounds : int
     read : callable
         Gives the :class:`Answer` in what a contender returns.
@@ -155,7 +155,7 @@ def compete(
         for row, one in zip(column, each, strict=True):
             row[: len(one[name])] = one[name]
         found[name] = ("contender", "cell"), column
-    return described(found, place)
+    return described(found, place_end)
 
 
 def errors(answer: Answer, exact: Answer) -> dict[str, NDArray[Any]]:
@@ -175,9 +175,9 @@ def errors(answer: Answer, exact: Answer) -> dict[str, NDArray[Any]]:
     }
 
 
-def described(ds: xr.Dataset, place: str) -> xr.Dataset:
+def described(ds: xr.Dataset, place_end: str) -> xr.Dataset:
     """The dataset with attributes; of what is about the end in the words and the unit of the model's place."""
-    end = OUTCOMES[f"{place}_end"]
+    end = OUTCOMES[place_end]
     for name, data in ds.items():
         variable = PRECISION[str(name)]
         if str(name).endswith("error_end"):

@@ -175,7 +175,7 @@ def _measure(config: Config, target: float, cells: int, rounds: int, progress: b
         dataset = compete(
             [Contender(method.name, _setting(method), partial(run, method), len(known)) for method in methods],
             answer(tight),
-            model.place,
+            model.place_end,
             rounds,
             lambda result: answer(result.rows, result.steps.mean()),
             clock=_clock,
@@ -189,7 +189,7 @@ def _measure(config: Config, target: float, cells: int, rounds: int, progress: b
         dataset[f"reference_{name}"] = "cell", errors(answer(looser), answer(tight))[name]
     if "t_separation" not in names:
         dataset = dataset.drop_vars(["error_separation", "reference_error_separation"])
-    dataset = described(dataset.map(lambda data: data.astype(PRECISION[data.name].dtype)), model.place)
+    dataset = described(dataset.map(lambda data: data.astype(PRECISION[data.name].dtype)), model.place_end)
 
     solvers = [solver_yaml(method) for method in methods]
     values = values_of_cells(scene, axes, sample[known])
