@@ -83,7 +83,9 @@ def no_impact(stops):
 def settled(stops, scene, stop, t, y, status, mode):
     """Status, mode and state of a body whose mode would be this one without stops; it may rest at one."""
     side, forcing = _side_at(stops, y[0]), drives.turn(scene.drive, t)
-    if status == RUNNING and side != 0 and _is_still(y[1], moving(scene, y[1] + forcing[1], y[1], forcing[1])):
+    # Rounding does not lift a body that has rested at a stop before the velocity of the belt jumped.
+    still = stop.rests != 0 or _is_still(y[1], moving(scene, y[1] + forcing[1], y[1], forcing[1]))
+    if status == RUNNING and side != 0 and still:
         mode, y = _at_rest(scene, mode.place, side, stop, t, y)
         return status, mode, y
     return status, with_stop(mode, stop), y
