@@ -18,7 +18,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from math import inf, nan
+from math import inf, nan, sqrt
 from typing import Any
 
 from ringsweep.compile import function_from_lines, inlined, specialise, stub
@@ -38,7 +38,7 @@ from ringsweep.numerics.functions import (
     square_root,
 )
 from ringsweep.numerics.lanes import LANES
-from ringsweep.numerics.series import INVERSE
+from ringsweep.numerics.series import INVERSE, variation
 from ringsweep.numerics.terms import MOST_GROUPS, NUMBERS, ORDER, PRODUCTS, numbers_from, powers, terms, total
 from ringsweep.physics.friction.formula import COEFFICIENTS, Threshold
 from ringsweep.quantities.parameters import Parameter
@@ -450,8 +450,8 @@ def series_term(expression, count, lanes, law, region, k, x, inner, begun, surfa
     return [*_region_prelude(expression), *_source_of_series(expression, count).step]
 
 
-# Largest change of the exponent of an exponential within a step, in any direction of the complex plane. The terms of
-# its series grow up to the one that this number counts; at the end of the series each is half of the one before. For a
+# Largest change of the exponent of an exponential within a step, in any direction of the complex plane. The terms of its
+# series grow up to the one that this number counts; at the end of the series each is half of the one before. For a
 # larger change the last terms give no estimate of the error; for half as much again it is too small by a factor of 2.
 _MAX_EXPONENT = ORDER / 2.0
 
@@ -469,12 +469,16 @@ def shorten_for_decay(sharpness, v, h):
     h : float
         Step, s.
     """
-    if sharpness == 0.0:
+    if sharpness == 0.0 or not sharpness * variation(v, h) > _MAX_EXPONENT:
         return h
+    # Solution of |v[1]| h + |v[2]| h^2 = most.
+    most, rate = _MAX_EXPONENT / sharpness, abs(v[1])
+    h = min(h, 2.0 * most / (rate + sqrt(rate * rate + 4.0 * most * abs(v[2]))))
     while True:
         sizes = abs(terms(v)) * powers(h)
-        exponent = sharpness * h * total(sizes)
-        if not exponent > 1.5 * _MAX_EXPONENT:
+        change = h * total(sizes)
+        if not change > 1.5 * most:
             return h
-        # The logarithm of the exponent is a convex function of that of the step: Newton's method comes from above.
-        h *= (_MAX_EXPONENT / exponent) ** (exponent / (sharpness * h * total(sizes * numbers_from(NUMBERS, 0))))
+        # Near an extreme of the velocity the other terms count. The logarithm of the change is a convex function of
+        # that of the step, so that Newton's method for it comes from above.
+        h *= (most / change) ** (change / (h * total(sizes * numbers_from(NUMBERS, 0))))
