@@ -38,8 +38,8 @@ from ringsweep.numerics.functions import (
     square_root,
 )
 from ringsweep.numerics.lanes import LANES
-from ringsweep.numerics.series import INVERSE, variation
-from ringsweep.numerics.terms import MOST_GROUPS, NUMBERS, ORDER, PRODUCTS, numbers_from, powers, terms, total
+from ringsweep.numerics.series import INVERSE
+from ringsweep.numerics.terms import MOST_GROUPS, PRODUCTS
 from ringsweep.physics.friction.formula import COEFFICIENTS, Threshold
 from ringsweep.quantities.parameters import Parameter
 
@@ -450,10 +450,9 @@ def series_term(expression, count, lanes, law, region, k, x, inner, begun, surfa
     return [*_region_prelude(expression), *_source_of_series(expression, count).step]
 
 
-# Largest change of the exponent of an exponential within a step, in any direction of the complex plane. The terms of its
-# series grow up to the one that this number counts; at the end of the series each is half of the one before. For a
-# larger change the last terms give no estimate of the error; for half as much again it is too small by a factor of 2.
-_MAX_EXPONENT = ORDER / 2.0
+# Largest change of the exponent of an exponential within a step. For a larger change the terms still grow at the end of
+# the series, so the last terms give no estimate of the error.
+_MAX_EXPONENT = 8.0
 
 
 @inlined
@@ -464,21 +463,13 @@ def shorten_for_decay(sharpness, v, h):
     ----------
     sharpness : float
         Third result of :func:`begin_series`, s/m.
-    v : ndarray of shape ``(ORDER + 1 or more,)``
+    v : ndarray of shape ``(3 or more,)``
         Series of the sliding velocity, m/s^(k + 1).
     h : float
         Step, s.
     """
-    if sharpness == 0.0 or not sharpness * variation(v, h) > _MAX_EXPONENT:
+    if sharpness == 0.0:
         return h
     # Solution of |v[1]| h + |v[2]| h^2 = most.
     most, rate = _MAX_EXPONENT / sharpness, abs(v[1])
-    h = min(h, 2.0 * most / (rate + sqrt(rate * rate + 4.0 * most * abs(v[2]))))
-    while True:
-        sizes = abs(terms(v)) * powers(h)
-        change = h * total(sizes)
-        if not change > 1.5 * most:
-            return h
-        # Near an extreme of the velocity the other terms count. The logarithm of the change is a convex function of
-        # that of the step, so that Newton's method for it comes from above.
-        h *= (most / change) ** (change / (h * total(sizes * numbers_from(NUMBERS, 0))))
+    return min(h, 2.0 * most / (rate + sqrt(rate * rate + 4.0 * most * abs(v[2]))))
