@@ -178,6 +178,7 @@ def test_a_history_of_a_pair_obeys_both_friction_laws():
     [
         ({"friction": {"law": "bengisu-akay", "mu_s": 0.2, "mu_k": 0.1, "alpha": 1.0, "v0": 0.1}}, "friction.law"),
         ({"friction": STICTION | {"mu_k_2": 0.3}}, "friction.mu_k_2"),
+        ({"friction": STICTION | {"mu_s": {"forward": 0.3, "backward": 0.2}}}, "friction.mu_s: is two numbers"),
         ({"force": {"constant": 1.0}}, "force"),
         ({"stops": {"high": 1.0}}, "stops"),
         ({"zone": {"half_length": 1.0}}, "zone"),

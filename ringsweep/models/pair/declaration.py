@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ringsweep.errors import InputError
 from ringsweep.models.belt import Belt
 from ringsweep.models.model import Model
 from ringsweep.models.pair.words import OF_EACH
@@ -57,6 +58,9 @@ class BeltPair(Model):
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Parameters of a scene of this structure, by path."""
+        if structure.two_way:
+            problem = f"is two numbers; the masses of model {self.name} take one for both directions of sliding"
+            raise InputError(f"scene.{structure.two_way[0]}", problem)
         of_belt = Belt().parameters(replace(structure, model=Belt.name))
         found = {f"body.mass_{i}": replace(MASS, long_name=f"mass {i}") for i in _MASSES}
         for i in _MASSES:
