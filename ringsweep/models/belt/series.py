@@ -292,18 +292,22 @@ def _seen_at_on_belt(scene, mode, c, s, h):
     return x, velocity, force, x - value(c[SHIFT], s), v, slope(c[V], s), located(scene, x, acceleration), nan
 
 
-@series.extremes.implements(belt.Belt)
-def _extremes_on_belt(scene, record, mode, c, h, work):
-    """Implement :func:`series.extremes`: of displacement, velocity and friction; and the ends of cycles."""
+@inlined
+def look_for_extremes(scene, record, c, rows, h, work, count):
+    """Append the instants at which the record of a body on a belt must look; see :func:`series.extremes`.
+
+    They are the extremes of displacement, velocity and friction, and the ends of cycles. `rows` are those of velocity,
+    acceleration and friction in the table, and a row to work in.
+    """
     # Look for an extreme only if it could exceed the recorded one.
-    count, change = 0, variation(c[VELOCITY], h)
-    if abs(c[VELOCITY, 0]) <= change:
-        count = crossings(c[VELOCITY], h, work, count)
-    if c[VELOCITY, 0] + change > record.velocity_max:
-        count = crossings(c[ACCELERATION], h, work, count)
-    if abs(c[FORCE, 0]) + variation(c[FORCE], h) > record.force_max:
-        differentiate(c[FORCE], c[RATIO])
-        count = crossings(c[RATIO], h, work, count)
+    velocity, force, change = c[rows[0]], c[rows[2]], variation(c[rows[0]], h)
+    if abs(velocity[0]) <= change:
+        count = crossings(velocity, h, work, count)
+    if velocity[0] + change > record.velocity_max:
+        count = crossings(c[rows[1]], h, work, count)
+    if abs(force[0]) + variation(force, h) > record.force_max:
+        differentiate(force, c[rows[3]])
+        count = crossings(c[rows[3]], h, work, count)
     # The forcing may end its next period; after the middle of the span it may end its first.
     due, t = record.cycles.next, record.last.t
     for rest in (due - t, scene.cycle - t if due < scene.cycle else 0.0):
@@ -311,3 +315,9 @@ def _extremes_on_belt(scene, record, mode, c, h, work):
             work[0][count] = rest
             count += 1
     return count
+
+
+@series.extremes.implements(belt.Belt)
+def _extremes_on_belt(scene, record, mode, c, h, work):
+    """Implement :func:`series.extremes`."""
+    return look_for_extremes(scene, record, c, (VELOCITY, ACCELERATION, FORCE, RATIO), h, work, 0)

@@ -5,6 +5,8 @@ A violation of 1 is what the tolerance explains.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from ringsweep.compile import inlined
@@ -12,16 +14,9 @@ from ringsweep.models.interface import audit
 from ringsweep.models.pair.contact_modes import forces_of, friction_of, kind_of, motion_of, scales_of
 from ringsweep.models.sliding import larger
 from ringsweep.physics import pair
-from ringsweep.quantities.flags import OSCILLATORY
 
 # Rounding of an acceleration, and an error of the balances that is more than rounding, as shares of their terms.
 _ROUNDING, _UNBALANCED = 1e-12, 1e-9
-
-# Statistics of two runs agree if the ranges of their displacements and their shares of stick differ by less.
-_SAME_SHARE = 0.1
-
-# An oscillation is certain if its swing is more than this share of the range of the displacement.
-_SMALLEST_SWING = 1e-2
 
 
 @inlined
@@ -79,25 +74,19 @@ def _least_scales_of_pair(batch):
 def _of_masses(found):
     """Outcomes of each mass by their names on a belt."""
     for i in "12":
-        yield {name[:-2]: numbers for name, numbers in vars(found).items() if name.endswith(f"_{i}")}
+        of_mass = {name[:-2]: numbers for name, numbers in vars(found).items() if name.endswith(f"_{i}")}
+        yield SimpleNamespace(regime=of_mass["motion"], **of_mass)
 
 
 @audit.undecided.implements(pair.BeltPair)
 def _undecided_of_pair(batch, one, other, fall_rates):
-    """Implement :func:`audit.undecided`: an oscillation whose swing may be an error of steady sliding."""
-    found = np.zeros(len(batch.span), dtype=bool)
-    for mass in _of_masses(one):
-        small = ~(mass["swing"] > _SMALLEST_SWING * (mass["x_max"] - mass["x_min"]))
-        found |= (mass["motion"] == OSCILLATORY) & small
-    return found
+    """Implement :func:`audit.undecided`: what is undecided of one mass."""
+    masses = zip((batch.first, batch.second), _of_masses(one), _of_masses(other), strict=True)
+    return np.logical_or(*(audit.undecided(*mass, fall_rates) for mass in masses))
 
 
 @audit.same_statistics.implements(pair.BeltPair)
 def _same_statistics_of_pair(batch, one, other):
-    """Implement :func:`audit.same_statistics`: ranges of the displacements and shares of stick."""
-    same = np.ones(len(batch.span), dtype=bool)
-    for first, second in zip(_of_masses(one), _of_masses(other), strict=True):
-        range_1, range_2 = (mass["x_max"] - mass["x_min"] for mass in (first, second))
-        same &= np.abs(range_1 - range_2) <= _SAME_SHARE * np.minimum(range_1, range_2)
-        same &= ~(np.abs(first["stick_share"] - second["stick_share"]) > _SAME_SHARE)
-    return same
+    """Implement :func:`audit.same_statistics`: those of both masses."""
+    masses = zip((batch.first, batch.second), _of_masses(one), _of_masses(other), strict=True)
+    return np.logical_and(*(audit.same_statistics(*mass) for mass in masses))

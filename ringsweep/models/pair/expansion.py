@@ -9,6 +9,7 @@ from math import inf, nan
 
 from ringsweep.compile import generated, inlined
 from ringsweep.models.belt.force import located
+from ringsweep.models.belt.series import look_for_extremes
 from ringsweep.models.interface import modes, series
 from ringsweep.models.pair.contact_modes import (
     HIGH,
@@ -20,7 +21,7 @@ from ringsweep.models.pair.contact_modes import (
     motion_of,
     scales_of,
 )
-from ringsweep.numerics.series import INVERSE, ORDER, crossings, differentiate, slope, step_within, value, variation
+from ringsweep.numerics.series import INVERSE, ORDER, slope, step_within, value, variation
 from ringsweep.numerics.terms import FACTOR_ROWS, MOST_GROUPS, set_terms, terms
 from ringsweep.physics import drives, pair
 
@@ -170,27 +171,9 @@ def _seen_at_of_pair(scene, mode, c, s, h):
     return _seen(scene.first, c, 0, s, h), _seen(scene.second, c, OF_EACH, s, h), stuck
 
 
-@inlined
-def _extremes(mass, r, c, first, h, work, count):
-    """Append the instants at which the record `r` of a mass must look; see :func:`series.extremes`."""
-    velocity, force, change = c[first + VELOCITY], c[first + FORCE], variation(c[first + VELOCITY], h)
-    if abs(velocity[0]) <= change:
-        count = crossings(velocity, h, work, count)
-    if velocity[0] + change > r.velocity_max:
-        count = crossings(c[first + ACCELERATION], h, work, count)
-    if abs(force[0]) + variation(force, h) > r.force_max:
-        differentiate(force, c[WORK])
-        count = crossings(c[WORK], h, work, count)
-    due, t = r.cycles.next, r.last.t
-    for rest in (due - t, mass.cycle - t if due < mass.cycle else 0.0):
-        if 0.0 < rest < h:
-            work[0][count] = rest
-            count += 1
-    return count
-
-
 @series.extremes.implements(pair.BeltPair)
 def _extremes_of_pair(scene, record, mode, c, h, work):
     """Implement :func:`series.extremes`: those of both masses."""
-    count = _extremes(scene.first, record.first, c, 0, h, work, 0)
-    return _extremes(scene.second, record.second, c, OF_EACH, h, work, count)
+    count = look_for_extremes(scene.first, record.first, c, (VELOCITY, ACCELERATION, FORCE, WORK), h, work, 0)
+    rows = OF_EACH + VELOCITY, OF_EACH + ACCELERATION, OF_EACH + FORCE, WORK
+    return look_for_extremes(scene.second, record.second, c, rows, h, work, count)
