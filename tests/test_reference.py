@@ -33,7 +33,7 @@ def test_python_calls_no_function_that_only_compiled_code_can_call(module):
 
 @pytest.mark.slow
 def test_springs_do_not_end_at_the_reactions_of_a_step_that_they_reject():
-    """Friction of bristles turns 1e4 times as fast as the springs ring: the first step that they try is far too long."""
+    """Friction of bristles turns 1e4 times as fast as the springs ring: the first step that is tried is too long."""
     mass, phi, omega = 2e5, 1.15, 94.7
     friction = rubs("lugre", rest=(0.48, 0.26), sigma0=4e3, sigma1=3e4, sigma2=0.0, v_s=0.0125)
     course_ = course("sinusoidal", 0.94, 476.0, -1.537, phi=phi, omega=omega, span=0.1)
