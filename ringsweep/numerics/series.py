@@ -74,6 +74,21 @@ def differentiate(row, derivative):
 
 
 @inlined
+def divide_by_time(c, least):
+    """Divide a series in place by the power of the time up to which it is zero, and return this power.
+
+    A guard that is zero as a mode begins vanishes again where the quotient does. The first `least` coefficients count
+    as zero. The power of a series that stays zero exceeds ORDER.
+    """
+    power = least
+    while power <= ORDER and c[power] == 0.0:
+        power += 1
+    for k in range(ORDER + 1 if power > 0 else 0):
+        c[k] = c[k + power] if k + power <= ORDER else 0.0
+    return power
+
+
+@inlined
 def step_size(last, previous):
     """Longest step within which the last two terms of a series stay within the tolerance, s.
 

@@ -13,7 +13,7 @@ from math import isnan, nan
 from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface import modes, recorder, series, variation
 from ringsweep.numerics.clock import later
-from ringsweep.numerics.series import ORDER, ascending, first_root
+from ringsweep.numerics.series import ORDER, ascending, divide_by_time, first_root
 from ringsweep.numerics.terms import powers, terms, total
 from ringsweep.solvers.steps import FACTOR
 from ringsweep.solvers.variation import along_series, enter_series
@@ -30,14 +30,8 @@ def _first_event_of_series(c, first, entry_guard, h, work):
     event, longest, scales = -1, h, powers(h)
     for g in range(first, c.shape[0]):
         row = c[g]
-        if g == entry_guard:
-            lowest = 0
-            while lowest < ORDER and row[lowest] == 0.0:
-                lowest += 1
-            if row[lowest] == 0.0:
-                continue
-            for k in range(ORDER + 1):
-                row[k] = row[k + lowest] if k + lowest <= ORDER else 0.0
+        if g == entry_guard and divide_by_time(row, 0) > ORDER:
+            continue
         if row[0] <= 0.0:
             return g, 0.0
         if isnan(row[0]):

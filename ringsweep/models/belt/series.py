@@ -47,7 +47,17 @@ from ringsweep.models.belt.mode import (
 from ringsweep.models.belt.stops import expand_stops, rests_at
 from ringsweep.models.interface import series
 from ringsweep.models.sliding import expand_bounds, speed_in
-from ringsweep.numerics.series import INVERSE, ORDER, crossings, differentiate, slope, step_within, value, variation
+from ringsweep.numerics.series import (
+    INVERSE,
+    ORDER,
+    crossings,
+    differentiate,
+    divide_by_time,
+    slope,
+    step_within,
+    value,
+    variation,
+)
 from ringsweep.numerics.terms import (
     inner_products,
     no_factors,
@@ -166,7 +176,10 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
             if abs(c[V, 1]) <= 1e-12 * size:
                 c[SLOW, 1] = 0.0
     if ring.if_load_varies(body, c[NORMAL, 0] == 0.0, False):
-        _from_no_load(c, mode.sign == 0)
+        # The load has yet to grow, or never does.
+        for row in (NORMAL, SLOW, FAST):
+            if row == NORMAL or mode.sign == 0:
+                divide_by_time(c[row], 0)
     _expand_edges(scene.surface, mode, c)
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     velocity = abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1])
@@ -193,34 +206,17 @@ def _expand_edges(surface, mode, c):
     """
     for row, side in ((EDGE_ABOVE, 1), (EDGE_BELOW, -1)):
         c[row, 0] = zones.distance_to_edge(surface, mode.place, side, c[X, 0], c[SHIFT, 0])
-        zeros = 0 if c[row, 0] != 0.0 else 1
         for k in range(1, ORDER + 1):
             c[row, k] = -side * zones.place_in(surface.frame, c[X, k], c[SHIFT, k])
-            if zeros == k and c[row, k] == 0.0:
-                zeros += 1
-        if zeros > ORDER or (mode.sign == 0 and not zones.carries(surface.frame)):
+        if divide_by_time(c[row], 0) > ORDER or (mode.sign == 0 and not zones.carries(surface.frame)):
             # Where the body rests among the zones there is no crossing.
-            c[row, 0], zeros = 1.0, 0
-        for k in range(ORDER + 1 if zeros > 0 else 0):
-            c[row, k] = c[row, k + zeros] if k + zeros <= ORDER else 0.0
+            c[row, 0] = 1.0
 
 
 @inlined
 def _has_dead_band(scene):
     """Whether a set-valued law holds the body at all sliding speeds below a positive bound, as Karnopp's does."""
     return holds_in_band(scene.law) and stiction_band(scene.law) > 0.0
-
-
-@inlined
-def _from_no_load(c, sticks):
-    """Divide guards that are zero at launch by a power of the time: the load has yet to grow, or never does."""
-    for row, begins in ((NORMAL, True), (SLOW, sticks), (FAST, sticks)):
-        zeros = 0
-        while begins and zeros < ORDER and c[row, zeros] == 0.0:
-            zeros += 1
-        if zeros < ORDER:
-            for k in range(ORDER + 1):
-                c[row, k] = c[row, k + zeros] if k + zeros <= ORDER else 0.0
 
 
 @inlined

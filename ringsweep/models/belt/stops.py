@@ -35,7 +35,7 @@ from ringsweep.models.interface import implicit
 from ringsweep.models.interface.status import RUNNING
 from ringsweep.models.sliding import REACTION_TOLERANCE, larger
 from ringsweep.models.slip import slip, zeros
-from ringsweep.numerics.series import ORDER, step_within
+from ringsweep.numerics.series import ORDER, divide_by_time, step_within
 from ringsweep.numerics.terms import joined, set_terms, terms
 from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.friction.registry import holds_in_band
@@ -194,20 +194,10 @@ def expand_stops(stops, scene, mode, tolerance, c, h):
             c[row, 1] = 0.0
             if abs(c[ACCELERATION, 0]) <= _BALANCED * located(scene, c[X, 0], 0.0).size:
                 c[row, 2] = 0.0
-        _divide_by_time(c[row])
+        if divide_by_time(c[row], 0) > ORDER:
+            # A guard that stays zero is none.
+            c[row, 0] = 1.0
     return h
-
-
-@inlined
-def _divide_by_time(row):
-    """Divide a guard that is zero at first by a power of the time; one that stays zero is no guard."""
-    zeros = 0
-    while zeros <= ORDER and row[zeros] == 0.0:
-        zeros += 1
-    for k in range(ORDER + 1):
-        row[k] = row[k + zeros] if k + zeros <= ORDER else 0.0
-    if zeros > ORDER:
-        row[0] = 1.0
 
 
 @inlined
@@ -231,7 +221,8 @@ def _expand_rest(scene, mode, tolerance, c, h):
     h = min(h, step_within(c, ((row, 1.0 / (size * tolerance)),)))
     if abs(c[row, 0]) <= _BALANCED * size:
         c[row, 0] = 0.0
-        _divide_by_time(c[row])
+        if divide_by_time(c[row], 0) > ORDER:
+            c[row, 0] = 1.0
     return h
 
 

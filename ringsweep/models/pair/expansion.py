@@ -21,7 +21,7 @@ from ringsweep.models.pair.contact_modes import (
     motion_of,
     scales_of,
 )
-from ringsweep.numerics.series import INVERSE, ORDER, slope, step_within, value, variation
+from ringsweep.numerics.series import INVERSE, ORDER, divide_by_time, slope, step_within, value, variation
 from ringsweep.numerics.terms import FACTOR_ROWS, MOST_GROUPS, set_terms, terms
 from ringsweep.physics import drives, pair
 
@@ -84,15 +84,10 @@ def _fill_guards(c, i, sign, mu_s, size, mass):
     high[0] = inf
     set_terms(low, terms(c[first + V]) * float(sign))
     low[0] = sign * c[first + V, 0]
-    if low[0] == 0.0:
-        # It begins to slip. If friction does not drop at breakaway, the rate is zero there too.
-        zeros = 2 if abs(low[1]) * mass <= _LEVEL * size else 1
-        while zeros < ORDER and low[zeros] == 0.0:
-            zeros += 1
-        for k in range(ORDER + 1):
-            low[k] = low[k + zeros] if k + zeros <= ORDER else 0.0
-        if low[0] == 0.0:
-            low[0] = inf
+    # As it begins to slip: if friction does not drop at breakaway, the rate is zero there too.
+    least = 2 if abs(low[1]) * mass <= _LEVEL * size else 1
+    if low[0] == 0.0 and divide_by_time(low, least) > ORDER:
+        low[0] = inf
 
 
 @series.fill_table.implements(pair.BeltPair)
