@@ -271,13 +271,9 @@ def _seen_sliding(scene, v, difference):
 @series.seen_at.implements(belt.Belt)
 def _seen_at_on_belt(scene, mode, c, s, h):
     """Implement :func:`series.seen_at`: what ``_observe_on_belt`` in :mod:`record` takes."""
-    scene, velocity = in_segment(scene.surface, scene, mode.place), value(c[VELOCITY], s)
-    if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
-        # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
-        velocity = 0.0
-    x, v, force, acceleration = value(c[X], s), value(c[V], s), value(c[FORCE], s), value(c[ACCELERATION], s)
-    yielding = yields(scene, mode)
-    if mode.sign != 0 and not yielding:
+    scene, (x, velocity, force, place, v, v_rate) = in_segment(scene.surface, scene, mode.place), seen_in_step(c, s, h)
+    acceleration = value(c[ACCELERATION], s)
+    if mode.sign != 0 and not yields(scene, mode):
         # Where the law bends, the series of friction is less exact than that of the motion.
         sign, body = float(mode.sign), _laden_after(scene.drive, scene, c, s).body
         mu, _ = friction_in(scene.law, mode.region, sign * v, coefficients(scene, sign))
@@ -285,25 +281,34 @@ def _seen_at_on_belt(scene, mode, c, s, h):
         before, force = force, sign * mu * load + if_force(body, scene.viscous, 0.0) * v
         acceleration += (before - force) / body.mass
     v = _seen_sliding(scene, v, value(c[VELOCITY], s) - slope(c[SHIFT], s))
-    return x, velocity, force, x - value(c[SHIFT], s), v, slope(c[V], s), located(scene, x, acceleration), nan
+    return x, velocity, force, place, v, v_rate, located(scene, x, acceleration), nan
 
 
 @inlined
-def look_for_extremes(scene, record, c, rows, h, work, count):
+def seen_in_step(c, s, h):
+    """First six numbers of what the record takes, within a step; the friction is that of its series."""
+    x, velocity, v = value(c[X], s), value(c[VELOCITY], s), value(c[V], s)
+    if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
+        # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
+        velocity = 0.0
+    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), v, slope(c[V], s)
+
+
+@inlined
+def look_for_extremes(scene, record, c, h, work, count):
     """Append the instants at which the record of a body on a belt must look; see :func:`series.extremes`.
 
-    They are the extremes of displacement, velocity and friction, and the ends of cycles. `rows` are those of velocity,
-    acceleration and friction in the table, and a row to work in.
+    They are the extremes of displacement, velocity and friction, and the ends of cycles.
     """
     # Look for an extreme only if it could exceed the recorded one.
-    velocity, force, change = c[rows[0]], c[rows[2]], variation(c[rows[0]], h)
+    velocity, force, change = c[VELOCITY], c[FORCE], variation(c[VELOCITY], h)
     if abs(velocity[0]) <= change:
         count = crossings(velocity, h, work, count)
     if velocity[0] + change > record.velocity_max:
-        count = crossings(c[rows[1]], h, work, count)
+        count = crossings(c[ACCELERATION], h, work, count)
     if abs(force[0]) + variation(force, h) > record.force_max:
-        differentiate(force, c[rows[3]])
-        count = crossings(c[rows[3]], h, work, count)
+        differentiate(force, c[RATIO])
+        count = crossings(c[RATIO], h, work, count)
     # The forcing may end its next period; after the middle of the span it may end its first.
     due, t = record.cycles.next, record.last.t
     for rest in (due - t, scene.cycle - t if due < scene.cycle else 0.0):
@@ -316,4 +321,4 @@ def look_for_extremes(scene, record, c, rows, h, work, count):
 @series.extremes.implements(belt.Belt)
 def _extremes_on_belt(scene, record, mode, c, h, work):
     """Implement :func:`series.extremes`."""
-    return look_for_extremes(scene, record, c, (VELOCITY, ACCELERATION, FORCE, RATIO), h, work, 0)
+    return look_for_extremes(scene, record, c, h, work, 0)

@@ -1,6 +1,6 @@
 """Power series of two masses on a belt, and the guards of their modes.
 
-`c` is the table of series. Each mass has OF_EACH rows in it, which the names below count from its first row.
+`c` is the table of series. Each mass has OF_EACH rows in it, those of a belt, counted from its first row.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ from math import inf, nan
 
 from ringsweep.compile import generated, inlined
 from ringsweep.models.belt.force import located
-from ringsweep.models.belt.series import look_for_extremes
+from ringsweep.models.belt.mode import ACCELERATION, FACTORS, FORCE, LOAD, SHIFT, VELOCITY, V, X
+from ringsweep.models.belt.series import look_for_extremes, seen_in_step
 from ringsweep.models.interface import modes, series
 from ringsweep.models.pair.contact_modes import (
     HIGH,
@@ -21,14 +22,14 @@ from ringsweep.models.pair.contact_modes import (
     motion_of,
     scales_of,
 )
-from ringsweep.numerics.series import INVERSE, ORDER, divide_by_time, slope, step_within, value, variation
+from ringsweep.numerics.series import INVERSE, ORDER, divide_by_time, slope, step_within, value
 from ringsweep.numerics.terms import FACTOR_ROWS, MOST_GROUPS, set_terms, terms
 from ringsweep.physics import drives, pair
 
-# Displacement, sliding velocity, velocity, acceleration, friction on the belt, reaction.
-X, V, VELOCITY, ACCELERATION, FORCE, NORMAL, OF_EACH = range(7)
+# The load on each mass is its reaction.
+NORMAL, OF_EACH = LOAD, FACTORS
 # Rows that the drive needs.
-SHIFT, WORK = 2 * OF_EACH, 2 * OF_EACH + 1
+WORK = 2 * OF_EACH
 GUARDS = WORK + MOST_GROUPS * FACTOR_ROWS
 
 # A guard may begin level if its rate is this share of the forces: but for rounding it is zero.
@@ -61,6 +62,7 @@ def _expansion(solved):
             w, N, F = solved(body, one, friction, (x_1, u_1, x_2, u_2, a))
             c[X, k], c[V, k], c[VELOCITY, k] = x_1, v_1, u_1
             c[ACCELERATION, k], c[FORCE, k], c[NORMAL, k] = w[0] + a, 0.0 - F[0], N[0]
+            c[OF_EACH + SHIFT, k] = c[SHIFT, k]
             c[OF_EACH + X, k], c[OF_EACH + V, k], c[OF_EACH + VELOCITY, k] = x_2, v_2, u_2
             c[OF_EACH + ACCELERATION, k], c[OF_EACH + FORCE, k], c[OF_EACH + NORMAL, k] = w[1] + a, 0.0 - F[1], N[1]
             rest = INVERSE[k + 1]
@@ -134,41 +136,28 @@ def _rates_at_of_pair(scene, c, s):
     return slope(c[X], s), slope(c[V], s), slope(c[OF_EACH + X], s), slope(c[OF_EACH + V], s)
 
 
-@inlined
-def _seen_at_start(mass, c, first):
-    """What the record of a belt is shown of the mass whose rows begin at `first`."""
-    x, v, velocity, force = c[first + X, 0], c[first + V, 0], c[first + VELOCITY, 0], c[first + FORCE, 0]
-    acceleration = located(mass, x, c[first + ACCELERATION, 0])
-    return x, velocity, force, x - c[SHIFT, 0], v, c[first + V, 1], acceleration, nan
-
-
 @series.seen_at_start.implements(pair.BeltPair)
 def _seen_at_start_of_pair(scene, c):
     """Implement :func:`series.seen_at_start`: what both records of belts are shown, and that neither mass sticks."""
-    return _seen_at_start(scene.first, c, 0), _seen_at_start(scene.second, c, OF_EACH), (False, False)
+    return series.seen_at_start(scene.first, c), series.seen_at_start(scene.second, c[OF_EACH:]), (False, False)
 
 
 @inlined
-def _seen(mass, c, first, s, h):
-    """What the record of a belt is shown of the mass whose rows begin at `first`, within a step."""
-    x, v, velocity = value(c[first + X], s), value(c[first + V], s), value(c[first + VELOCITY], s)
-    if abs(velocity) <= 1e-15 * (abs(c[first + VELOCITY, 0]) + variation(c[first + VELOCITY], h)):
-        # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
-        velocity = 0.0
-    force, acceleration = value(c[first + FORCE], s), located(mass, x, value(c[first + ACCELERATION], s))
-    return x, velocity, force, x - value(c[SHIFT], s), v, slope(c[first + V], s), acceleration, nan
+def _seen(mass, c, s, h):
+    """What the record of a belt is shown of the mass whose rows are `c`, within a step."""
+    motion = seen_in_step(c, s, h)
+    return *motion, located(mass, motion[0], value(c[ACCELERATION], s)), nan
 
 
 @series.seen_at.implements(pair.BeltPair)
 def _seen_at_of_pair(scene, mode, c, s, h):
     """Implement :func:`series.seen_at`: what both records of belts are shown, and which mass sticks."""
     stuck = mode.signs[0] == 0, mode.signs[1] == 0
-    return _seen(scene.first, c, 0, s, h), _seen(scene.second, c, OF_EACH, s, h), stuck
+    return _seen(scene.first, c, s, h), _seen(scene.second, c[OF_EACH:], s, h), stuck
 
 
 @series.extremes.implements(pair.BeltPair)
 def _extremes_of_pair(scene, record, mode, c, h, work):
     """Implement :func:`series.extremes`: those of both masses."""
-    count = look_for_extremes(scene.first, record.first, c, (VELOCITY, ACCELERATION, FORCE, WORK), h, work, 0)
-    rows = OF_EACH + VELOCITY, OF_EACH + ACCELERATION, OF_EACH + FORCE, WORK
-    return look_for_extremes(scene.second, record.second, c, rows, h, work, count)
+    count = look_for_extremes(scene.first, record.first, c, h, work, 0)
+    return look_for_extremes(scene.second, record.second, c[OF_EACH:], h, work, count)
