@@ -163,10 +163,8 @@ class Belt(Model, Continues):
             found[f"drive.{name}"] = _along_a_line(name, p) if structure.own_drive is None else p
         found["force.constant"] = forces.CONSTANT
         if structure.own_load is not None:
-            of_load = {
-                n: replace(p, long_name=f"parameter {n} of the load") for n, p in declared(structure.own_load).items()
-            }
-            found |= {f"body.load.{name}": p for name, p in of_load.items()}
+            for name, p in declared(structure.own_load).items():
+                found[f"body.load.{name}"] = replace(p, long_name=f"parameter {name} of the load")
         elif structure.load is not None:
             found["body.load.amplitude"] = replace(forces.FACTOR, long_name="factor on the load of the table")
         if structure.own_force is not None:
@@ -302,13 +300,9 @@ class Belt(Model, Continues):
         given = [name for name in ("amplitude", "frequency", "phase") if f"force.{name}" in values]
         zero = np.zeros(len(values["time.span"]))
         constant = values.get("force.constant", zero)
-        if structure.force is not None:
-            factor = values["force.amplitude"]
-            force: Any = table_of(*structure.force, factor, "force", values)
-            largest = abs(factor) * np.abs(structure.force[1]).max()
-        elif structure.own_force is not None:
-            force = by_formula(structure.own_force, "force", "formula", values)
-            largest = abs(drives.extremes_of(force, values["time.span"])).max(axis=0)
+        if structure.force is not None or structure.own_force is not None:
+            force, ends = _given(structure.force, structure.own_force, "force", values)
+            largest = abs(ends).max(axis=0)
         elif given:
             for name, example in (("amplitude", "1 N"), ("frequency", "1 Hz")):
                 if name not in given:
@@ -388,15 +382,18 @@ def _with_load(drive: Any, structure: Structure, values: Values) -> tuple[forces
     zero = np.zeros(len(values["time.span"]))
     if not isinstance(drive, forces.Forced):
         drive = forces.Forced(drive, drives.Still(), zero, zero)
-    if structure.load is not None:
-        factor = values["body.load.amplitude"]
-        ends = np.multiply.outer([structure.load[1].min(), structure.load[1].max()], factor)
-        load: Any = table_of(*structure.load, factor, "body.load", values)
-    else:
-        assert structure.own_load is not None
-        load = by_formula(structure.own_load, "body.load", "formula", values)
-        ends = drives.extremes_of(load, values["time.span"])
+    load, ends = _given(structure.load, structure.own_load, "body.load", values)
     return forces.Laden(drive, load, drive.largest, ends.min(axis=0)), abs(ends).max(axis=0)
+
+
+def _given(table: Any, own: Any, section: str, values: Values) -> tuple[Any, NDArray[np.float64]]:
+    """Force or load of a section, by a table or else by a formula, and its least and greatest value, N."""
+    if table is None:
+        found = by_formula(own, section, "formula", values)
+        return found, drives.extremes_of(found, values["time.span"])
+    factor, (times, samples, interpolate) = values[f"{section}.amplitude"], table
+    found = table_of(times, samples, interpolate, factor, section, values)
+    return found, np.multiply.outer([samples.min(), samples.max()], factor)
 
 
 # Cycles in a span if neither the forcing nor a spring has a period.
