@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from ringsweep.config import yaml_text
+from ringsweep.config import neighbours, yaml_text
 from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
-from ringsweep.config.continued import FROM, put_state, run_to_continue
-from ringsweep.config.neighbours import Follow, Refinement, read_follow, read_refinement, with_direction
 from ringsweep.config.options import read_solver
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import suggestion, warn_once
@@ -72,9 +70,9 @@ class Config:
     axes: Axes
     source: dict[str, Any]
     name: str
-    refine: Refinement | None = None
+    refine: neighbours.Refinement | None = None
     sample: Sample | None = None
-    follow: Follow | None = None
+    follow: neighbours.Follow | None = None
     begins_from: str | None = None
 
     @property
@@ -191,13 +189,13 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         if path.removeprefix("scene.") in swept:
             raise InputError(path, "is swept here: --set changes values that all cells share")
     laws = next(((where, given) for path, where, _, given in columns if path == LAW), None)
-    if (file := run_to_continue(doc)) is not None:
+    if (file := neighbours.run_to_continue(doc)) is not None:
         try:
-            put_state(doc, parse_scene(doc, swept, laws), file, load(file), swept)
+            neighbours.put_state(doc, parse_scene(doc, swept, laws), file, load(file), swept)
         except InputError as error:
             if file not in (error.file, error.path):
                 raise
-            raise InputError(FROM, f"{file}: {error.problem}") from None
+            raise InputError(neighbours.FROM, f"{file}: {error.problem}") from None
     scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = build_axes(scene, columns)
@@ -207,7 +205,8 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     if (sample := read_sample(sweep.get("sample"), scene, axes)) is None:
         check_consistency(scene, axes)
     given = tree.get("sweep", {})
-    refine, follow = read_refinement(given.get("refine"), axes), read_follow(given.get("follow"), scene, axes)
+    refine = neighbours.read_refinement(given.get("refine"), axes)
+    follow = neighbours.read_follow(given.get("follow"), scene, axes)
     # A section stands beside all but cells that are inferred, and probabilities.
     section = None if refine is None and sample is None else scene.structure.section
     parts = {"sweep.refine": refine, "sweep.sample": sample, "sweep.follow": follow, "record.section": section}
@@ -217,7 +216,8 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         raise InputError(excluding[0], problem)
     # Axes that a program gives are in SI units.
     _warn_of_units(scene, changed, columns if doc.columns is None and doc.locations else ())
-    axes = with_direction(axes, follow)
+    if follow is not None and len(follow.ways) > 1:
+        axes = Axes({**axes.sizes, neighbours.DIRECTION: len(follow.ways)}, axes.columns)
     return Config(scene, solver, axes, tree, doc.name, refine, sample, follow, begins_from=file)
 
 
