@@ -164,7 +164,7 @@ def _document(config: Source, parts: Mapping[str, Any], axes: Mapping[str, Any] 
             continue
         if section is not doc.tree:
             doc.tree["sweep"] = section
-        section[key] = yaml_text.read({key: given}).tree[key]
+        section[key] = doc.plain(given, place)
         doc.locations = {path: line for path, line in doc.locations.items() if not f"{path}.".startswith(f"{place}.")}
         # No line of the file is at fault for what a program gives.
         doc.locations[place] = None, None
@@ -218,7 +218,7 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     _warn_of_units(scene, changed, columns if doc.columns is None and doc.locations else ())
     if follow is not None and len(follow.ways) > 1:
         axes = Axes({**axes.sizes, neighbours.DIRECTION: len(follow.ways)}, axes.columns)
-    return Config(scene, solver, axes, tree, doc.name, refine, sample, follow, begins_from=file)
+    return Config(scene, solver, axes, tree, doc.file.stem, refine, sample, follow, begins_from=file)
 
 
 def _warn_of_units(scene: Scene, changed: Mapping[str, tuple[Any, Any]], columns: Iterable[Given]) -> None:

@@ -212,7 +212,7 @@ def run_to_continue(doc: Document) -> str | None:
     for key in initial:
         raise InputError(f"scene.initial.{key}", _BESIDE)
     # A configuration could name another file in turn, without end. A result holds the values.
-    if not is_result(file := doc.folder / name):
+    if not is_result(file := doc.file.parent / name):
         problem = "is no result file" if file.exists() else "does not exist"
         raise InputError(FROM, f"{file} {problem}: `ringsweep run` or `simulate` writes one")
     return str(file)

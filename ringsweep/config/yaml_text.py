@@ -50,10 +50,8 @@ class Document:
     ----------
     tree : dict
         Nested dicts and lists of numbers, booleans, None and strings, as given.
-    folder : Path
-        Folder to which file names in the configuration are relative.
-    name : str
-        Name of the file without suffix.
+    file : Path
+        Its file, to whose folder file names in the configuration are relative.
     locations : dict of str to tuple
         File and line of each dotted path.
     columns : list of tuple, optional
@@ -63,12 +61,12 @@ class Document:
         Whether it comes from a result file.
     """
 
-    tree: dict[str, Any]
-    folder: Path = field(default_factory=Path)
-    name: str = "ringsweep"
+    tree: dict[str, Any] = field(default_factory=dict)
+    file: Path = Path("ringsweep")
     locations: dict[str, tuple[str | None, int | None]] = field(default_factory=dict)
     columns: list[tuple[Any, str, str, Any]] | None = None
     is_result: bool = False
+    _count: int = 0
 
     @contextmanager
     def locating_errors(self) -> Iterator[None]:
@@ -83,6 +81,42 @@ class Document:
                     path = path.rpartition(".")[0]
                 error.file, error.line = self.locations.get(path, (None, None))
             raise
+
+    def plain(self, given: Any, path: str = "", depth: int = 0) -> Any:
+        """What stands at a path, as plain values: a YAML node, whose lines are noted, or a value of a program."""
+        self._count += 1
+        if self._count > MAX_VALUES:
+            problem = f"more than {MAX_VALUES} values after expanding aliases; put long columns into a CSV file"
+            raise InputError(path, problem)
+        if isinstance(given, yaml.Node):
+            self.locations.setdefault(path, (str(self.file), given.start_mark.line + 1))
+            if given.tag not in _TAGS:
+                raise InputError(path, f"the tag {given.tag} is not allowed")
+            if isinstance(given, yaml.ScalarNode):
+                return scalar(given.value) if given.style is None else given.value
+            given = given.value if isinstance(given, yaml.SequenceNode) else self._pairs(given, path)
+        if depth > _MAX_DEPTH:
+            raise InputError(path, "nested too deeply, or an alias within itself")
+        if isinstance(given := spelled(given), Mapping):
+            for key in given:
+                if not isinstance(key, str):
+                    raise InputError(path, f"keys are text, got {show(key)}")
+            return {key: self.plain(child, _join(path, key), depth + 1) for key, child in given.items()}
+        if isinstance(given, list | tuple | range) or (isinstance(given, np.ndarray) and given.ndim):
+            return [self.plain(child, _join(path, i), depth + 1) for i, child in enumerate(given)]
+        return _plain(given, path)
+
+    def _pairs(self, node: yaml.Node, path: str) -> dict[str, yaml.Node]:
+        found: dict[str, yaml.Node] = {}
+        for key, child in node.value:
+            within = _join(path, key.value) if isinstance(key, yaml.ScalarNode) else path
+            self.locations[within] = str(self.file), key.start_mark.line + 1
+            if within == path or key.tag not in _TAGS:
+                raise InputError(within, "a key must be plain text")
+            if key.value in found:
+                raise InputError(within, "given twice")
+            found[key.value] = child
+        return found
 
     def inline_csv(self, name: Any, path: str, section: str, **names: str) -> dict[str, list[Any]]:
         """Columns of a CSV file by their names in its header. A unit in the header is appended to each value.
@@ -105,7 +139,7 @@ class Document:
         """
         if not isinstance(name, str):
             raise InputError(path, f"a file name is expected, got {show(name)}")
-        file = self.folder / name
+        file = self.file.parent / name
         if self.is_result:
             # Results hold their tables, so this one was changed: it could name any file of the reader.
             logger.info("%s: read from %s", path, file)
@@ -122,31 +156,28 @@ class Document:
             header = next(rows, [])
             if len(header) == 1 and (mark := next((mark for mark in ";\t|" if mark in header[0]), None)):
                 raise wrong(f"the columns are separated by {mark!r}: separate them by commas")
-            columns: dict[str, tuple[str, list[Any]]] = {}
+            columns, units = dict[str, list[Any]](), list[str]()
             for cell in header:
                 name, unit = name_and_unit(cell)
                 if not name:
                     form = "a name is expected, and behind it the unit in brackets: phi (deg)"
                     raise wrong(f"column {show(cell.strip())}: {form}")
-                name = names.get(name, name)
-                if name in columns:
+                if (name := names.get(name, name)) in columns:
                     raise wrong(f"two columns have the name {name}")
-                columns[name] = unit, []
+                columns[name] = []
+                units.append(unit)
+                self.locations[f"{section}.{name}"] = str(file), 1
             if not columns:
                 raise wrong("the file is empty")
-            for row in rows:
-                if not any(cell.strip() for cell in row):
-                    continue
+            for row in (row for row in rows if any(map(str.strip, row))):
                 if len(row) != len(columns):
                     raise wrong(f"{len(row)} values under {len(columns)} columns")
-                for (column, (unit, cells)), cell in zip(columns.items(), row, strict=True):
-                    self.locations[f"{section}.{column}.{len(cells)}"] = str(file), rows.line_num
-                    cells.append(scalar(f"{cell.strip()} {unit}".strip()))
+                for column, unit, cell in zip(columns, units, row, strict=True):
+                    self.locations[f"{section}.{column}.{len(columns[column])}"] = str(file), rows.line_num
+                    columns[column].append(scalar(f"{cell.strip()} {unit}".strip()))
         except csv.Error as error:
             raise wrong(f"not a CSV file: {error}") from None
-        for column in columns:
-            self.locations[f"{section}.{column}"] = str(file), 1
-        return {column: cells for column, (_, cells) in columns.items()}
+        return columns
 
 
 def name_and_unit(header: str) -> tuple[str, str]:
@@ -164,19 +195,22 @@ def read(config: Source) -> Document:
         If it is no YAML mapping of plain values, or a result file without a configuration.
     """
     if isinstance(config, Mapping):
-        return Document(_Reader().value(config))
+        doc = Document()
+        doc.tree = doc.plain(config)
+        return doc
     if not isinstance(config, str | os.PathLike):
         raise InputError("config", f"a path or a mapping is expected, got {show(config)}")
-    file = Path(config)
-    if is_result(file):
+    if is_result(file := Path(config)):
         return _read_result(file)
-    text, reader = _read(file, _LARGEST_CONFIGURATION), _Reader(str(file))
+    text, doc = _read(file, _LARGEST_CONFIGURATION), Document(file=file)
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         if not isinstance(node, yaml.MappingNode):
             found = "is empty" if node is None else "holds no mapping"
             raise InputError("", f"{found}: a configuration has the sections scene, solver and sweep", file=str(file))
-        return Document(reader.value(node), file.parent, file.stem, reader.locations)
+        with doc.locating_errors():
+            doc.tree = doc.plain(node)
+        return doc
     except InputError:
         raise
     # On escapes of characters that do not exist PyYAML raises ValueError or OverflowError.
@@ -221,7 +255,9 @@ def _read_result(file: Path) -> Document:
                 (one.path, one.path, one.path, xr.Variable(one.dimensions, np.array(one[:].tolist())))
                 for one in sorted(swept, key=lambda one: dims.index(one.dimensions[0]))
             ]
-    return Document(_Reader().value(tree), file.parent, file.stem, {"": (str(file), None)}, columns, is_result=True)
+    doc = Document({}, file, {"": (str(file), None)}, columns, is_result=True)
+    doc.tree = doc.plain(tree)
+    return doc
 
 
 def scalar(text: str) -> Any:
@@ -239,59 +275,6 @@ def scalar(text: str) -> Any:
             return int(text)
         return number if math.isfinite(number) else text
     return text
-
-
-class _Reader:
-    """Makes dicts, lists, numbers, booleans, None and strings of YAML nodes, whose lines it records, or of a mapping.
-
-    Quantities of pint become strings.
-    """
-
-    def __init__(self, file: str | None = None):
-        self.file = file
-        self.locations: dict[str, tuple[str | None, int | None]] = {}
-        self.count = 0
-
-    def value(self, given: Any, path: str = "", depth: int = 0) -> Any:
-        """Plain value of what stands at a path."""
-        self.count += 1
-        if self.count > MAX_VALUES:
-            problem = f"more than {MAX_VALUES} values after expanding aliases; put long columns into a CSV file"
-            raise InputError("", problem, file=self.file)
-        if isinstance(given, yaml.Node):
-            self._locate(path, given)
-            if isinstance(given, yaml.ScalarNode):
-                return scalar(given.value) if given.style is None else given.value
-            given = given.value if isinstance(given, yaml.SequenceNode) else self._pairs(given, path)
-        if depth > _MAX_DEPTH:
-            _, line = self.locations.get(path, (None, None))
-            raise InputError(path, "nested too deeply, or an alias within itself", file=self.file, line=line)
-        if isinstance(given := spelled(given), Mapping):
-            for key in given:
-                if not isinstance(key, str):
-                    raise InputError(path, f"keys are text, got {show(key)}")
-            return {key: self.value(child, _join(path, key), depth + 1) for key, child in given.items()}
-        if isinstance(given, list | tuple | range) or (isinstance(given, np.ndarray) and given.ndim):
-            return [self.value(child, _join(path, i), depth + 1) for i, child in enumerate(given)]
-        return _plain(given, path)
-
-    def _locate(self, path: str, node: yaml.Node) -> None:
-        line = node.start_mark.line + 1
-        self.locations.setdefault(path, (self.file or "", line))
-        if node.tag not in _TAGS:
-            raise InputError(path, f"the tag {node.tag} is not allowed", file=self.file, line=line)
-
-    def _pairs(self, node: yaml.Node, path: str) -> dict[str, yaml.Node]:
-        found: dict[str, yaml.Node] = {}
-        for key, child in node.value:
-            line = key.start_mark.line + 1
-            if not isinstance(key, yaml.ScalarNode) or key.tag not in _TAGS:
-                raise InputError(path, "a key must be plain text", file=self.file, line=line)
-            if key.value in found:
-                raise InputError(_join(path, key.value), "given twice", file=self.file, line=line)
-            self.locations[_join(path, key.value)] = self.file or "", line
-            found[key.value] = child
-        return found
 
 
 def _plain(value: Any, path: str) -> str | bool | int | float | None:

@@ -123,7 +123,7 @@ def fitted(config: Config, data: Any, vary: Any, start: Any = 8, noise: Any = No
         from lmfit import Model, Parameters
     except ImportError:
         raise InputError("fit", "lmfit is not installed: pip install 'ringsweep[fit]'") from None
-    doc = Document({})
+    doc = Document()
     with doc.locating_errors():
         name, t, measured = _measurements(config, doc, data)
     ranges = _ranges(config, vary)
