@@ -271,9 +271,13 @@ def _seen_sliding(scene, v, difference):
 @series.seen_at.implements(belt.Belt)
 def _seen_at_on_belt(scene, mode, c, s, h):
     """Implement :func:`series.seen_at`: what ``_observe_on_belt`` in :mod:`record` takes."""
-    scene, (x, velocity, force, place, v, v_rate) = in_segment(scene.surface, scene, mode.place), seen_in_step(c, s, h)
-    acceleration = value(c[ACCELERATION], s)
-    if mode.sign != 0 and not yields(scene, mode):
+    scene, velocity = in_segment(scene.surface, scene, mode.place), value(c[VELOCITY], s)
+    if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
+        # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
+        velocity = 0.0
+    x, v, force, acceleration = value(c[X], s), value(c[V], s), value(c[FORCE], s), value(c[ACCELERATION], s)
+    yielding = yields(scene, mode)
+    if mode.sign != 0 and not yielding:
         # Where the law bends, the series of friction is less exact than that of the motion.
         sign, body = float(mode.sign), _laden_after(scene.drive, scene, c, s).body
         mu, _ = friction_in(scene.law, mode.region, sign * v, coefficients(scene, sign))
@@ -281,17 +285,7 @@ def _seen_at_on_belt(scene, mode, c, s, h):
         before, force = force, sign * mu * load + if_force(body, scene.viscous, 0.0) * v
         acceleration += (before - force) / body.mass
     v = _seen_sliding(scene, v, value(c[VELOCITY], s) - slope(c[SHIFT], s))
-    return x, velocity, force, place, v, v_rate, located(scene, x, acceleration), nan
-
-
-@inlined
-def seen_in_step(c, s, h):
-    """First six numbers of what the record takes, within a step; the friction is that of its series."""
-    x, velocity, v = value(c[X], s), value(c[VELOCITY], s), value(c[V], s)
-    if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
-        # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
-        velocity = 0.0
-    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), v, slope(c[V], s)
+    return x, velocity, force, x - value(c[SHIFT], s), v, slope(c[V], s), located(scene, x, acceleration), nan
 
 
 @inlined

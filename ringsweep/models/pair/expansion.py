@@ -10,7 +10,7 @@ from math import inf, nan
 from ringsweep.compile import generated, inlined
 from ringsweep.models.belt.force import located
 from ringsweep.models.belt.mode import ACCELERATION, FACTORS, FORCE, LOAD, SHIFT, VELOCITY, V, X
-from ringsweep.models.belt.series import look_for_extremes, seen_in_step
+from ringsweep.models.belt.series import look_for_extremes
 from ringsweep.models.interface import modes, series
 from ringsweep.models.pair.contact_modes import (
     HIGH,
@@ -22,7 +22,7 @@ from ringsweep.models.pair.contact_modes import (
     motion_of,
     scales_of,
 )
-from ringsweep.numerics.series import INVERSE, ORDER, divide_by_time, slope, step_within, value
+from ringsweep.numerics.series import INVERSE, ORDER, divide_by_time, slope, step_within, value, variation
 from ringsweep.numerics.terms import FACTOR_ROWS, MOST_GROUPS, set_terms, terms
 from ringsweep.physics import drives, pair
 
@@ -145,8 +145,12 @@ def _seen_at_start_of_pair(scene, c):
 @inlined
 def _seen(mass, c, s, h):
     """What the record of a belt is shown of the mass whose rows are `c`, within a step."""
-    motion = seen_in_step(c, s, h)
-    return *motion, located(mass, motion[0], value(c[ACCELERATION], s)), nan
+    x, v, velocity = value(c[X], s), value(c[V], s), value(c[VELOCITY], s)
+    if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
+        # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
+        velocity = 0.0
+    force, acceleration = value(c[FORCE], s), located(mass, x, value(c[ACCELERATION], s))
+    return x, velocity, force, x - value(c[SHIFT], s), v, slope(c[V], s), acceleration, nan
 
 
 @series.seen_at.implements(pair.BeltPair)
