@@ -31,25 +31,14 @@ from ringsweep.quantities.variables import MASSES, OUTCOMES
 #: Outcomes on which two resolutions must agree for a certificate.
 _CERTIFIED = ("regime", "motion", "motion_1", "motion_2", "separating_contact", "aftermath", "word")
 
-# Outcomes that may be NaN in a certified run.
+# Outcomes that may be NaN in a certified run; those of one body have a number behind them where there are several.
+_OF_A_BODY = "first_slip", "period", "stops_per_cycle", "swing", "jump_max", "t_jump_max"
 _MAY_LACK = (
-    "t_separation",
-    "t_recovered",
-    "first_slip",
-    "period",
-    "stops_per_cycle",
-    "swing",
-    "jump_max",
-    "t_jump_max",
-    "normal_max_1",
-    "normal_max_2",
+    *("t_separation", "t_recovered", "normal_max_1", "normal_max_2"),
+    *_OF_A_BODY,
+    *(f"{name}_{i}" for i in MASSES for name in _OF_A_BODY),
     *tangent.OUTCOMES,
     *(name for name, variable in OUTCOMES.items() if "section" in variable.dims),
-    *(
-        f"{name}_{i}"
-        for i in MASSES
-        for name in ("first_slip", "period", "stops_per_cycle", "swing", "jump_max", "t_jump_max")
-    ),
 )
 
 # Forces, and jumps of the acceleration: they follow from the motion, and friction may magnify its errors.
