@@ -26,8 +26,11 @@ def function_from_lines(names: str, lines: list[str], scope: dict[str, Any]) -> 
     return scope["body"]
 
 
-def stub(function: Callable[..., Any], names: list[str], call: Callable[..., Any]) -> Any:
-    """Function that passes its arguments, `names`, to `call`; with name and docstring of `function`."""
+def stub(function: Callable[..., Any], names: list[str], call: Any, choose: Any, *, absorb: bool = False) -> Any:
+    """Function that passes its arguments, `names`, to `call`; with name and docstring of `function`.
+
+    Kernels call the body that `choose` finds for the types of the arguments, see :func:`specialise`.
+    """
 
     def found(*arguments: Any) -> Any:
         return call(*arguments)
@@ -35,6 +38,7 @@ def stub(function: Callable[..., Any], names: list[str], call: Callable[..., Any
     found.__name__, found.__doc__, found.__module__ = function.__name__, function.__doc__, function.__module__
     parameters = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
     found.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    specialise(found, choose, absorb=absorb)
     return found
 
 
@@ -51,9 +55,7 @@ def unrolled(write: Callable[..., Any]) -> Any:
     def body(first: Any) -> Any:
         return function_from_lines(", ".join(names), write(len(first), *names), write.__globals__)
 
-    found = stub(write, names, lambda *arguments: body(arguments[0])(*arguments))
-    specialise(found, lambda *kinds: body(kinds[0]))
-    return found
+    return stub(write, names, lambda *arguments: body(arguments[0])(*arguments), lambda *kinds: body(kinds[0]))
 
 
 def generated(write: Callable[..., Any] | None = None, *, absorb: bool = False) -> Any:
@@ -78,9 +80,7 @@ def generated(write: Callable[..., Any] | None = None, *, absorb: bool = False) 
         made = write(*kinds)
         return function_from_lines(", ".join(names), *made) if isinstance(made, tuple) else made
 
-    found = stub(write, names, refuse)
-    specialise(found, body, absorb=absorb)
-    return found
+    return stub(write, names, refuse, body, absorb=absorb)
 
 
 def feature(otherwise: str, *, of: type | Collection[type] = (), absorb: bool = False) -> Any:
@@ -115,9 +115,7 @@ def feature(otherwise: str, *, of: type | Collection[type] = (), absorb: bool = 
         def typed(*kinds: Any) -> Any:
             return chosen(tuple if kinds[0] == types.Tuple(()) else getattr(kinds[0], "instance_class", None))
 
-        found = stub(body, names, lambda *arguments: chosen(type(arguments[0]))(*arguments))
-        specialise(found, typed, absorb=absorb)
-        return found
+        return stub(body, names, lambda *arguments: chosen(type(arguments[0]))(*arguments), typed, absorb=absorb)
 
     return decorate
 

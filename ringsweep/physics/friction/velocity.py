@@ -21,7 +21,7 @@ from functools import cache
 from math import inf, nan, sqrt
 from typing import Any
 
-from ringsweep.compile import function_from_lines, inlined, specialise, stub
+from ringsweep.compile import function_from_lines, inlined, stub
 from ringsweep.numerics import writer
 from ringsweep.numerics.expressions import Node, derivative, substitute, symbol
 from ringsweep.numerics.functions import (
@@ -205,9 +205,7 @@ def _derived(write: Callable[..., list[str]]) -> Any:
         in_lanes = LANES in kinds
         return body(getattr(kinds[0], "instance_class", None), count_of(kinds), in_lanes)
 
-    found = stub(write, names, function)
-    specialise(found, typed, absorb=True)
-    return found
+    return stub(write, names, function, typed, absorb=True)
 
 
 # ---- regions ----------------------------------------------------------------------------------
