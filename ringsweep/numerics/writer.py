@@ -48,6 +48,7 @@ class _Writer:
     indent: str = ""
     known: dict[Node, str] = field(default_factory=dict)
     count: int = 0
+    free: int = 0
 
     def write(self, line: str) -> None:
         """Append a line."""
@@ -153,9 +154,14 @@ def float_lines(names: Mapping[str, str], outputs: list[Node], side: str) -> lis
     side : str
         Condition for the lower side of a switch; ``{}`` stands for the index of its threshold.
     """
+    return _body(names, outputs, partial(_write_for_floats, side=side))
+
+
+def _body(names: Mapping[str, str], outputs: list[Node], compute: Callable[[_Writer, list[Node]], None]) -> list[str]:
+    """Body that returns the values of `outputs`, which `compute` writes."""
     writer = _Writer(names)
     writer.constants(*outputs)
-    _write_for_floats(writer, outputs, side)
+    compute(writer, outputs)
     writer.write("return (" + "".join(f"{writer.known[output]}, " for output in outputs) + ")")
     return writer.lines
 
@@ -170,12 +176,16 @@ def _write_for_floats(writer: _Writer, outputs: list[Node], side: str) -> None:
 def _branch(writer: _Writer, switches: list[Node], below: str, compute: Callable[[list[Node]], None]) -> None:
     """Compute switches of one threshold: on each side of it only the parts of that side, by `compute`."""
     targets = [writer.new("0.0") for _ in switches]
+    free = most = writer.free
     for k, head in enumerate((f"if {below}:", "else:")):
-        parts = [node.parts[k] for node in switches]
+        parts, writer.free = [node.parts[k] for node in switches], free
         with writer.block(head):
             compute(parts)
             for target, part in zip(targets, parts, strict=True):
-                writer.write(f"{target} = {writer.known[part]}")
+                # A constant of which a coefficient is sought has none.
+                writer.write(f"{target} = {writer.known.get(part, '0.0')}")
+        most = max(most, writer.free)
+    writer.free = most
     writer.known.update(zip(switches, targets, strict=True))
 
 
@@ -203,11 +213,7 @@ def varies_lines(output: Node, side: str) -> list[str]:
 
 def lanes_lines(names: Mapping[str, str], outputs: list[Node], threshold: str) -> list[str]:
     """Body that returns the values of `outputs` in vector lanes; ``{}`` in `threshold` stands for an index."""
-    writer = _Writer(names)
-    writer.constants(*outputs)
-    _write_for_lanes(writer, outputs, threshold, "")
-    writer.write("return (" + "".join(f"{writer.known[output]}, " for output in outputs) + ")")
-    return writer.lines
+    return _body(names, outputs, partial(_write_for_lanes, threshold=threshold, context=""))
 
 
 def _calls(parts: list[Node], known: Mapping[Node, str]) -> bool:
@@ -279,7 +285,6 @@ class _Step(_Writer):
 
     needed: dict[tuple[Node, str], str] = field(default_factory=dict)
     products: int = 0
-    free: int = 0
 
     def begun(self, node: Node, what: str = "value") -> str:
         """A number that is known from the beginning of the series."""
@@ -388,20 +393,7 @@ def _sharpen(writer: _Writer, inner: Node, unit: str, scale: float, side: str) -
 def _series(step: _Step, outputs: list[Node], side: str) -> None:
     """Write coefficient k of outputs."""
     for threshold, switches in _frontier([o for o in outputs if o.varies], step.known).items():
-        targets = [step.new("0.0") for _ in switches]
-        free = step.free
-        most = free
-        for k, head in enumerate((f"if {side.format(threshold)}:", "else:")):
-            parts = [node.parts[k] for node in switches]
-            step.free = free
-            with step.block(head):
-                _series(step, parts, side)
-                for target, part in zip(targets, parts, strict=True):
-                    step.write(f"{target} = {step.known[part] if part.varies else '0.0'}")
-            most = max(most, step.free)
-        step.free = most
-        step.known.update(zip(switches, targets, strict=True))
-
+        _branch(step, switches, side.format(threshold), partial(_series, step, side=side))
     for output in outputs:
         _visit(step, output)
 
