@@ -19,6 +19,7 @@ from ringsweep.models.interface.variation import Exponent
 from ringsweep.models.model import Continues, Model, period_of, phases
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, surface_from, zone_parameters
 from ringsweep.models.ring import long_run, record
+from ringsweep.models.ring.series import HISTORY
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import PAPER, contact, drives, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
@@ -139,8 +140,7 @@ class SingleContactRing(Model, Continues):
 
     def history(self, structure: Structure) -> tuple[str, ...]:
         """Names of the history variables, in the order of their columns."""
-        names = "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
-        return (*names, "deflection_1", "deflection_2") if self._has_bristles(structure) else names
+        return (*HISTORY, "deflection_1", "deflection_2") if self._has_bristles(structure) else HISTORY
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Parameters of a scene of this structure, by path."""

@@ -698,9 +698,13 @@ def _extremes_on_ring(scene, record, mode, c, h, work):
     return count
 
 
+#: History variables, in the order of their columns; behind them stand the deflections of bristles.
+HISTORY = "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
+
+
 @modes.row.implements(ring.Ring, ring.BristleRing)
 def _row_on_ring(scene, mode, forcing, y, seen):
-    """Implement :func:`modes.row`: the columns of ``Model.history``; the last ones are deflections of bristles."""
+    """Implement :func:`modes.row`: the columns :data:`HISTORY`, and the deflections of bristles."""
     phi, omega, normal_1, normal_2, located = seen[:5]
     places, state = zones_of(scene, mode.place_1, mode.place_2), 0.0 if mode.region < 0 else float(mode.sign)
     return phi, omega, located.acceleration, normal_1, normal_2, forcing[1], *places, state, *y[2:]

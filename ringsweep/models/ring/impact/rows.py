@@ -8,15 +8,14 @@ from __future__ import annotations
 from ringsweep.models.interface import modes
 from ringsweep.models.ring.impact.mode import BOTH
 from ringsweep.models.ring.impact.switch import motion_of
+from ringsweep.models.ring.series import HISTORY as OF_RING
+from ringsweep.models.ring.series import with_places
 from ringsweep.physics import ring
 from ringsweep.physics.impact import ImpactRing, contact_of
-from ringsweep.physics.zones import coefficients, locate
+from ringsweep.physics.zones import locate
 
 #: History variables, in the order of their columns.
-HISTORY = (
-    *("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"),
-    *("x", "y", "gap_1", "gap_2"),
-)
+HISTORY = *OF_RING, "x", "y", "gap_1", "gap_2"
 #: Columns behind them: the last event, see :class:`ringsweep.models.ring.impact.mode.Event`.
 EVENT = ("number", "time", "event", "contact", "speed", "impulse")
 
@@ -24,28 +23,18 @@ EVENT = ("number", "time", "event", "contact", "speed", "impulse")
 @modes.row.implements(ImpactRing)
 def _row_with_impact(scene, mode, forcing, y, seen):
     """Implement :func:`modes.row`: the columns :data:`HISTORY`, then :data:`EVENT`."""
-    psi, rate, normal_1, normal_2, located = seen[0], seen[1], seen[2], seen[3], seen[4]
-    contacts, (theta, ring_omega, _) = mode.contacts, forcing
-    event = contacts.event
-    motion = motion_of(scene, y, ring_omega)
+    contacts, event, theta = mode.contacts, mode.contacts.event, forcing[0]
+    motion = motion_of(scene, y, forcing[1])
     first = contact_of(scene.balls, 1, motion)
     second = contact_of(scene.balls, 2, motion) if ring.contact_count(scene.closed.body) == 2 else first
     # On an edge the mode knows on which side of it a contact rubs.
     surface = scene.closed.surface
-    segment_1 = locate(surface, first.alpha - theta)[0] if contacts.open % 2 == 1 else mode.place_1[0]
-    segment_2 = locate(surface, second.alpha - theta)[0] if contacts.open >= 2 else mode.place_2[0]
-    _, _, zone_1 = coefficients(surface, segment_1)
-    _, _, zone_2 = coefficients(surface, segment_2)
+    place_1 = locate(surface, first.alpha - theta) if contacts.open % 2 == 1 else mode.place_1
+    place_2 = locate(surface, second.alpha - theta) if contacts.open >= 2 else mode.place_2
+    of_ring = modes.row(scene.closed, with_places(mode, place_1, place_2), forcing, y[:2], seen)
     return (
-        psi,
-        rate,
-        located.acceleration,
-        normal_1,
-        normal_2,
-        ring_omega,
-        zone_1,
-        zone_2,
-        0.0 if contacts.open == BOTH or mode.region < 0 else float(mode.sign),
+        *of_ring[:-1],
+        0.0 if contacts.open == BOTH else of_ring[-1],
         motion.x,
         motion.y,
         first.gap if contacts.open % 2 == 1 else 0.0,
