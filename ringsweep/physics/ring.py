@@ -114,34 +114,22 @@ def angular_velocity(body, v, ring_omega):
     return 0.0 if abs(omega) < _ROUNDING * (abs(relative) + abs(ring_omega)) else omega
 
 
-#: Functions of a body that follow from its declaration. `Equations` writes them.
-DERIVED: list[Any] = []
-
-
-def _derived(stub: Any = None, *, absorb: bool = False) -> Any:
-    """Hook that is one of :data:`DERIVED`."""
-    if stub is None:
-        return partial(_derived, absorb=absorb)
-    DERIVED.append(hook(stub, absorb=absorb))
-    return DERIVED[-1]
-
-
-@_derived
+@hook
 def contact_offset(body):
     """Half the angle between the contacts, rad. Contact 1 is at ``phi - offset``, contact 2 at ``phi + offset``."""
 
 
-@_derived
+@hook
 def radius(body):
     """Velocity of the body at its contacts per unit of the rate of its coordinate: the radius of the race, m."""
 
 
-@_derived
+@hook
 def free_determinant(body):
     """Determinant of the balances without friction, kg m^2. 1 for bodies that cannot jam."""
 
 
-@_derived(absorb=True)
+@hook(absorb=True)
 def acceleration(body, K1, K2, motion):
     """Angular acceleration of the body in slip, and the determinant that tells whether the body jams.
 
@@ -161,12 +149,12 @@ def acceleration(body, K1, K2, motion):
     """
 
 
-@_derived
+@hook
 def contact_count(body):
     """Number of contacts of a body, 1 or 2."""
 
 
-@_derived(absorb=True)
+@hook(absorb=True)
 def acceleration_slope(body, K1, K2, slope_1, slope_2, motion):
     """Derivative of the angular acceleration by way of friction: d phi_dd/dK1 slope_1 + d phi_dd/dK2 slope_2.
 
@@ -184,7 +172,7 @@ def acceleration_slope(body, K1, K2, slope_1, slope_2, motion):
     """
 
 
-@_derived(absorb=True)
+@hook(absorb=True)
 def acceleration_gradient(body, K1, K2, motion):
     """Derivatives of the angular acceleration by angle and by angular velocity, at constant K1 and K2.
 
@@ -200,7 +188,7 @@ def acceleration_gradient(body, K1, K2, motion):
     """
 
 
-@_derived(absorb=True)
+@hook(absorb=True)
 def friction_gain(body, motion):
     """Derivative of the angular acceleration by K, with the same K at all contacts, at K = 0.
 
@@ -216,7 +204,7 @@ def friction_gain(body, motion):
     """
 
 
-@_derived
+@hook
 def reaction_determinant(body):
     """Determinant D of the reactions without friction, 1. Errors of friction grow in the reactions by 1/D.
 
@@ -224,7 +212,7 @@ def reaction_determinant(body):
     """
 
 
-@_derived(absorb=True)
+@hook(absorb=True)
 def reactions(body, K1, K2, motion):
     """Normal reactions in slip: the paper's Eq. 17 with the angular acceleration eliminated.
 
@@ -242,7 +230,7 @@ def reactions(body, K1, K2, motion):
     """
 
 
-@_derived
+@hook
 def slip_balance(body, K1, K2):
     """Solution of the balances in slip, where friction is K_i N_i plus a given force.
 
@@ -263,7 +251,7 @@ def slip_balance(body, K1, K2):
     """
 
 
-@_derived
+@hook
 def determinant_terms(body, one, K1, K2, both):
     """Determinant of the balances as a linear function of 1, K_1, K_2 and K_1 K_2.
 
@@ -280,7 +268,7 @@ def determinant_terms(body, one, K1, K2, both):
     """
 
 
-@_derived
+@hook
 def held(body, one, motion, square, epsilon, F2):
     """Forces at the contacts from the balances and not from a friction law: so in stick too.
 
@@ -308,7 +296,7 @@ def held(body, one, motion, square, epsilon, F2):
     """
 
 
-@_derived
+@hook
 def driven(body, one, motion, square, F1, F2):
     """Acceleration of the body under given friction forces, rad/s^2, linear in the arguments after `body`.
 
@@ -321,12 +309,12 @@ def driven(body, one, motion, square, F1, F2):
     """
 
 
-@_derived(absorb=True)
+@hook(absorb=True)
 def if_load_varies(body, yes, no):
     """`yes` if a reaction depends on motion or friction, else `no`: then no contact can open."""
 
 
-@_derived
+@hook
 def energy(body, motion):
     """Kinetic and potential energy of the body, J. Its rate is :func:`power`.
 
@@ -337,7 +325,7 @@ def energy(body, motion):
     """
 
 
-@_derived
+@hook
 def power(body, K1, K2, N1, N2, motion):
     """Power of friction, and of other forces that are not in the energy, W: from the last balance.
 
@@ -350,7 +338,7 @@ def power(body, K1, K2, N1, N2, motion):
     """
 
 
-@_derived
+@hook
 def imbalance(body, K1, K2, N1, N2, phi_dd, motion):
     """Error of the balances as they are written down: sum of its squares, each as a share of those of the terms.
 
@@ -365,10 +353,13 @@ def imbalance(body, K1, K2, N1, N2, phi_dd, motion):
     """
 
 
-@_derived(absorb=True)
+@hook(absorb=True)
 def size(body, motion):
     """Sum of the magnitudes of the terms of the last balance without friction and inertia, N m, or N on a belt."""
 
+
+#: Functions of a body that follow from its declaration: all hooks of this file. `Equations` writes them.
+DERIVED = [found for found in vars().values() if hasattr(found, "implements")]
 
 # What makes the equations of each type that :func:`body` declares, once they are needed.
 _EQUATIONS: dict[type, Callable[[], Equations]] = {}
