@@ -47,13 +47,11 @@ class Dieterich(NamedTuple):
     reference_velocity: _V_0
 
 
-class Ruina(NamedTuple):
-    """Contacts that age in slip: :math:`\\dot\\theta = -(|v|\\theta/D_c) \\ln(|v|\\theta/D_c)` (Ruina 1983)."""
+class Ruina(Dieterich):
+    """Contacts that age in slip: :math:`\\dot\\theta = -(|v|\\theta/D_c) \\ln(|v|\\theta/D_c)` (Ruina 1983).
 
-    a: _A
-    b: _B
-    critical_distance: _D_C
-    reference_velocity: _V_0
+    The parameters are those of :class:`Dieterich`.
+    """
 
 
 @absorbed
