@@ -94,18 +94,17 @@ def _longest(axes: Axes) -> tuple[str, ...]:
 #: Dimension of a sweep that follows its axis in both directions, and its values.
 DIRECTION, BOTH = "direction", ("up", "down")
 
+#: Values of ``sweep.follow.direction``.
+DIRECTIONS = {
+    "up": "from the least value to the greatest",
+    "down": "from the greatest value to the least",
+    "both": "up and down, along the dimension direction",
+}
+
 #: Keys of ``sweep.follow``.
 FOLLOW: Keys = {
     "axis": Key("a path that the sweep varies", example="force.frequency"),
-    "direction": Key(
-        "direction",
-        {
-            "up": "from the least value to the greatest",
-            "down": "from the greatest value to the least",
-            "both": "up and down, along the dimension direction",
-        },
-        "up",
-    ),
+    "direction": Key("direction", DIRECTIONS, "up"),
 }
 
 # Drives that are the same at all times, or whose phase a scene can have.

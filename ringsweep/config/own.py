@@ -81,8 +81,7 @@ def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:
     ... }
     >>> run = ringsweep.sweep(scene, {})
     """
-    if not _may_name(name):
-        raise InputError("friction_law", f"{show(name)} cannot be the name of a law: choose another name")
+    _check_name(name, "friction_law")
     definition = Definition(mu, at_rest)
     law = _law(definition, "friction_law")
     LAWS.pop(name, None)
@@ -90,10 +89,10 @@ def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:
     _REGISTERED[name] = definition
 
 
-def _may_name(name: object) -> bool:
-    """Whether a law of a user may have a name."""
-    free = name not in LAWS or name in _REGISTERED
-    return isinstance(name, str) and name not in ("", FORMULA, TABLE_LAW) and free
+def _check_name(name: object, path: str) -> None:
+    """Refuse a name that a law of a user cannot have."""
+    if not isinstance(name, str) or name in ("", FORMULA, TABLE_LAW) or (name in LAWS and name not in _REGISTERED):
+        raise InputError(path, f"{show(name)} cannot be the name of a law: choose another name")
 
 
 def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
@@ -104,14 +103,11 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
     InputError
         If a definition is wrong.
     """
-    where, found, given = "scene.friction.laws", {}, friction.get("laws", {})
-    if not isinstance(given, Mapping):
-        raise InputError(where, f"a section with a name and a formula of each law is expected, got {show(given)}")
-    for name, section in given.items():
-        path = f"{where}.{name}"
+    found = {}
+    for name, section in section_of({"laws": {}, **friction}, "laws", "scene.friction.").items():
+        path = f"scene.friction.laws.{name}"
         definition = Definition(**read_keys(section, LAW_KEYS, path))
-        if not _may_name(name):
-            raise InputError(path, f"{show(name)} cannot be the name of a law: choose another name")
+        _check_name(name, path)
         found[name] = _law(definition, path)
     # Beside another law a text may be the formula for a sweep over laws; a number is a misnamed coefficient.
     of_formula = friction.get("law", FORMULA) == FORMULA or isinstance(friction.get("mu"), str)
@@ -120,7 +116,7 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
     return found
 
 
-def law_choice(model: str, own: Mapping[str, type]) -> Choice:
+def law_choice(model: str, own: Iterable[str]) -> Choice:
     """Friction laws that a model takes, and those that the configuration defines."""
     return Choice("friction law", tuple(dict.fromkeys([*MODELS[model].laws, *own, FORMULA, TABLE_LAW])))
 

@@ -24,6 +24,7 @@ from ringsweep.physics.friction.formula import NAMES
 from ringsweep.physics.friction.registry import SURFACE
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, quantity, show
+from ringsweep.quantities.variables import written
 
 #: Values of ``initial.steady``.
 STEADY = {"slip": "the body rests in space, where spring, friction and constant forces balance"}
@@ -40,8 +41,7 @@ _LARGEST_ANGLE = 4.0 * pi
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
     """Every path of a scene that a sweep can vary, with its parameter."""
-    defined = {law: structure.own_law for law, structure in scene.structures.items() if structure.own_law is not None}
-    return {**numbers_of(scene.structures), LAW: own.law_choice(scene.structure.model, defined)}
+    return {**numbers_of(scene.structures), LAW: own.law_choice(scene.structure.model, scene.structures)}
 
 
 def outcome_numbers(scene: Scene) -> list[str]:
@@ -85,12 +85,10 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     if section is not None:
         section = section._replace(deflections=any(family_of({**LAWS, **defined}[law]) is Dynamic for law in names))
     moved = replace(moved, exponent=exponent, section=section, arcs=_arcs(scene, zones, leaves))
-    if moved.drive == "table":
-        moved = replace(moved, table=own.read_samples(doc, scene["drive"], "drive"))
-    if any(f"force.{name}" in leaves for name in own.TABLE_KEYS["force"]):
-        moved = replace(moved, force=own.read_samples(doc, scene["force"], "force"))
-    if moved.load is not None:
-        moved = replace(moved, load=own.read_samples(doc, scene["body"]["load"], "body.load"))
+    tabled = {"drive": moved.drive == "table", "body.load": moved.load is not None}
+    tabled["force"] = any(f"force.{name}" in leaves for name in own.TABLE_KEYS["force"])
+    table, load, force = (own.read_samples(doc, written(doc.tree, of), of) if tabled[of] else None for of in tabled)
+    moved = replace(moved, table=table, load=load, force=force)
     structures = {
         law: replace(moved, law=law, own_law=defined.get(law), curve=curve if law == own.TABLE_LAW else None)
         for law in names
@@ -98,9 +96,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     values = _read_numbers(structures, leaves, swept)
     _warn_of_unused_numbers(structures, leaves)
     numbers = numbers_of(structures)
-    # Lengths of a friction law are those of asperities.
-    lengths = [path for path, p in numbers.items() if p.unit == "m" and not path.startswith("friction.")]
-    _warn_of_lengths({path: values[path] for path in lengths if path in values})
+    _warn_of_lengths({path: values[path] for path, p in numbers.items() if p.unit == "m" and path in values})
     for path, parameter in numbers.items():
         if path in leaves:
             warn_of_plain_angle(path, leaves[path], parameter)
@@ -189,18 +185,17 @@ def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
 
 def _two_way(scene: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
     """Paths of the friction coefficients that the scene or the sweep gives for both directions of sliding."""
-    friction = section if isinstance(section := scene.get("friction"), dict) else {}
-    places = {f"friction.{name}": friction.get(name) for name in ("rough", *ELSEWHERE)}
-    places |= {"friction": friction, **{path: scene["zones"][i] for i, path in enumerate(_zones(scene))}}
-    split = {
-        f"{place}.{name}": None
-        for place, given in places.items()
-        if isinstance(given, dict)
-        for name, value in given.items()
-        if isinstance(value, dict)
-    }
-    split |= {path.rpartition(".")[0]: None for path in map(str, swept) if path.endswith(_ENDS)}
-    return tuple(path for path in split if path.rpartition(".")[2] in SURFACE)
+    split = *_sections(scene), *(path.rpartition(".")[0] for path in map(str, swept) if path.endswith(_ENDS))
+    return tuple(path for path in dict.fromkeys(split) if path.rpartition(".")[2] in SURFACE)
+
+
+def _sections(node: Any, prefix: str = "") -> Iterator[str]:
+    """Paths of all sections below a path that ends with a dot."""
+    for key, child in node.items() if isinstance(node, dict) else enumerate(node):
+        if isinstance(child, dict):
+            yield f"{prefix}{key}"
+        if isinstance(child, dict | list):
+            yield from _sections(child, f"{prefix}{key}.")
 
 
 def _takes_force(model: str) -> bool:
@@ -254,7 +249,8 @@ def _warn_of_unused_numbers(structures: Mapping[str, Structure], leaves: Collect
 
 def _warn_of_lengths(lengths: Mapping[str, float]) -> None:
     """Warn of lengths so different that a unit may be wrong."""
-    given = sorted((abs(value), path) for path, value in lengths.items() if value)
+    # Those of a friction law are lengths of asperities.
+    given = sorted((abs(value), path) for path, value in lengths.items() if value and not path.startswith("friction."))
     if given and given[-1][0] > _LARGEST_RATIO * given[0][0]:
         (short, small), (long, large) = given[0], given[-1]
         message = "scene.%s is %g m and scene.%s is %g m: is a unit missing? A plain number is in metres"
