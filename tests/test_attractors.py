@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import on_belt, with_all_parts
+from refusals import refused
 
 import ringsweep
-from ringsweep import InputError
 
 
 def sections(x, velocity=None, dims=("initial_x",), **variables):
@@ -111,10 +111,8 @@ def test_labels_draw_a_map():
 
 
 def test_a_sweep_without_a_section_is_refused():
-    with pytest.raises(InputError, match="record"):
-        ringsweep.attractors(xr.Dataset({"regime": ("a", [1])}))
-    with pytest.raises(InputError, match="tolerance"):
-        ringsweep.attractors(sections([[1.0]]), tolerance=0.0)
+    refused("record", ringsweep.attractors, xr.Dataset({"regime": ("a", [1])}))
+    refused("tolerance", ringsweep.attractors, sections([[1.0]]), tolerance=0.0)
 
 
 def belt(velocity, law=None, **sections):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import on_belt, outcome, with_all_parts
+from refusals import refused
 from tiers import mostly_slow
 
 import ringsweep
@@ -409,17 +410,14 @@ class TestRegimes:
 
 class TestInput:
     def test_dead_band_with_too_much_viscous_friction_is_refused(self):
-        with pytest.raises(ringsweep.InputError, match=r"friction\.viscous.*dead band"):
-            outcome(belt("karnopp", dead_band=0.01, viscous=100.0))
+        refused(r"friction\.viscous.*dead band", outcome, belt("karnopp", dead_band=0.01, viscous=100.0))
 
     @pytest.mark.slow
     def test_belt_needs_either_a_velocity_or_a_drive(self):
         scene = belt()
         del scene["belt"]
-        with pytest.raises(ringsweep.InputError, match="velocity: missing"):
-            ringsweep.simulate(scene)
+        refused("velocity: missing", ringsweep.simulate, scene)
         scene["spring"]["cubic"] = 0.0
         rocking = scene | {"drive": {"law": "sinusoidal", "amplitude": "0.2 m", "frequency": 1.0}}
         assert REGIMES[int(ringsweep.simulate(rocking | {"time": {"span": 5}}).regime)] != "failed"
-        with pytest.raises(ringsweep.InputError, match="given together with drive"):
-            ringsweep.simulate(rocking | {"belt": {"velocity": 0.1}})
+        refused("given together with drive", ringsweep.simulate, rocking | {"belt": {"velocity": 0.1}})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -186,8 +187,7 @@ def test_a_history_of_a_pair_obeys_both_friction_laws():
     ],
 )
 def test_what_a_pair_does_not_take_is_refused_at_its_place(change, path):
-    with pytest.raises(ringsweep.InputError, match=f"scene.{path}"):
-        ringsweep.sweep(coupled(**change), {"belt.velocity": [0.1]}, jobs=1, progress=False)
+    refused(f"scene.{path}", ringsweep.sweep, coupled(**change), {"belt.velocity": [0.1]}, jobs=1, progress=False)
 
 
 @pytest.mark.parametrize(
@@ -200,5 +200,4 @@ def test_what_a_pair_does_not_take_is_refused_at_its_place(change, path):
     ],
 )
 def test_a_method_or_record_without_a_pair_is_refused(extra, path):
-    with pytest.raises(ringsweep.InputError, match=path):
-        ringsweep.run({"scene": coupled()} | extra, jobs=1, progress=False)
+    refused(path, ringsweep.run, {"scene": coupled()} | extra, jobs=1, progress=False)

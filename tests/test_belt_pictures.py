@@ -6,10 +6,10 @@ from belts import on_belt
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.quiver import Quiver
+from refusals import refused
 
 import ringsweep
 from ringsweep import plots
-from ringsweep.errors import InputError
 from ringsweep.plots import films
 from ringsweep.plots.look import PAIR_COLOURS
 from ringsweep.plots.phase import _MODE_STYLES
@@ -108,8 +108,7 @@ class TestPortrait:
         plots.phase_portrait(small, ax=(below := Figure().add_subplot()))
         assert below.get_xlabel() == "displacement (µm)"
         assert below.xaxis.get_major_formatter()(5e-6, 0) == "5"
-        with pytest.raises(InputError, match=r"frame: 'ring'.*belt"):
-            plots.phase_portrait(run, "ring", ax)
+        refused(r"frame: 'ring'.*belt", plots.phase_portrait, run, "ring", ax)
 
 
 class TestFrictionLoop:
@@ -152,16 +151,13 @@ class TestFrictionLoop:
         assert ax.get_xlabel() == "distance slid on the belt (m)"
 
     def test_unknown_axis_and_a_ring_are_refused(self, run, ax):
-        with pytest.raises(InputError, match="neither 'velocity' nor 'distance'"):
-            plots.friction_loop(run, "place", ax)
-        with pytest.raises(InputError, match="there is no belt"):
-            plots.friction_loop(run.rename(x="phi"), ax=ax)
+        refused("neither 'velocity' nor 'distance'", plots.friction_loop, run, "place", ax)
+        refused("there is no belt", plots.friction_loop, run.rename(x="phi"), ax=ax)
 
 
 @pytest.mark.parametrize("draw", [plots.phase_portrait, plots.friction_loop, plots.animation])
 def test_pictures_of_a_belt_refuse_runs_without_its_motion(run, draw):
-    with pytest.raises(InputError, match=r"no belt_velocity.*run it again"):
-        draw(run.drop_vars("belt_velocity"))
+    refused(r"no belt_velocity.*run it again", draw, run.drop_vars("belt_velocity"))
 
 
 @pytest.fixture(scope="module")

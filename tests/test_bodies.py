@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, reject
 from hypothesis import strategies as st
+from refusals import refused
 from solutions import rod
 
-from ringsweep.errors import InputError
 from ringsweep.models.ring import SingleContactRing
 from ringsweep.models.scene import Structure
 from ringsweep.physics import contact, ring
@@ -296,8 +296,7 @@ class TestModel:
 
     @pytest.mark.parametrize("wrong", [lambda values: Sledge(1.0), lambda values: math.cos(values["gravity"])])
     def test_body_that_cannot_be_built_is_told(self, wrong):
-        with pytest.raises(InputError, match=r"sledge: build_body fails with TypeError: .* use NumPy"):
-            self.cells(wrong)
+        refused(r"sledge: build_body fails with TypeError: .* use NumPy", self.cells, wrong)
 
     def test_contacts_are_those_of_the_balances(self):
         class OnShoes(SingleContactRing):

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
+from refusals import refused
 
 import ringsweep
 from ringsweep import cli, plots
@@ -84,8 +85,7 @@ class TestBoundary:
         """A run halfway between two cells would have the one number from there, and the other from a cell."""
         dim = str(ds["regime"].dims[0])
         both = ds.assign_coords(another=(dim, ds[dim].values, {"path": "gravity", "units": "m s-2"}))
-        with pytest.raises(InputError, match=f"another varies along {dim}"):
-            ringsweep.boundary(both, "separating", 1e-3)
+        refused(f"another varies along {dim}", ringsweep.boundary, both, "separating", 1e-3)
 
     @pytest.mark.parametrize(
         ("change", "problem"),
@@ -100,8 +100,7 @@ class TestBoundary:
         changed = change(ds)
         if "zone_half_angle" in changed.coords:
             changed["zone_half_angle"].attrs = ds["zone_half_angle"].attrs
-        with pytest.raises(InputError, match=problem):
-            ringsweep.boundary(changed, "separating")
+        refused(problem, ringsweep.boundary, changed, "separating")
 
     def test_regime_without_cells_has_no_curve_and_a_warning(self, ds, tmp_path, capsys, caplog):
         netcdf.save(ds, tmp_path / "my.nc")
@@ -142,8 +141,7 @@ class TestBoundary:
         ],
     )
     def test_mistake_is_refused(self, ds, regime, tolerance, problem):
-        with pytest.raises(InputError, match=problem):
-            ringsweep.boundary(ds, regime, tolerance)
+        refused(problem, ringsweep.boundary, ds, regime, tolerance)
 
     @pytest.mark.slow
     def test_curves_are_drawn_over_the_map_and_written(self, ds, curves, tmp_path, capsys):

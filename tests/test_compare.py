@@ -11,6 +11,7 @@ import xarray as xr
 import yaml
 from belts import on_belt
 from jsonschema import Draft202012Validator
+from refusals import refused
 from rings import edited
 
 import ringsweep
@@ -18,7 +19,6 @@ from ringsweep import plots
 from ringsweep.cli import main
 from ringsweep.config import load, with_values
 from ringsweep.config.schema import schema
-from ringsweep.errors import InputError
 from ringsweep.storage import netcdf
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -37,10 +37,7 @@ def grid(**axes):
     return changed(sweep={"grid": {path.replace("__", "."): values for path, values in axes.items()}})
 
 
-def refusal(call, *arguments):
-    with pytest.raises(InputError) as caught:
-        call(*arguments)
-    return caught.value
+refusal = partial(refused, None)
 
 
 @pytest.fixture(scope="module")

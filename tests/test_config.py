@@ -18,6 +18,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
+from refusals import refused
 from rings import TYPED as TEXT
 
 import ringsweep
@@ -40,6 +41,7 @@ SOLVER = {"method": "rk4", "steps": 1000}
 
 
 edited = partial(rings.edited, SCENE)
+refusal = partial(refused, None)
 
 
 def read_scene(scene):
@@ -71,13 +73,6 @@ def told(caplog):
         return caplog.messages
 
     return messages
-
-
-def refusal(call, *arguments, **options):
-    with pytest.raises(InputError) as caught:
-        call(*arguments, **options)
-    assert "\n" not in str(caught.value)
-    return caught.value
 
 
 def test_example_is_read_in_si_units_and_its_json_source_reads_the_same(write):

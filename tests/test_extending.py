@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import yaml
 from matplotlib.figure import Figure
+from refusals import refused
 
 import ringsweep
 from ringsweep.compile import SOURCES_DIGEST
-from ringsweep.errors import InputError
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "extending.md").read_text(encoding="utf-8")
@@ -268,8 +268,7 @@ def test_picture_of_the_page_shows_the_reactions_of_the_run(scene):
     drawn = drawn[np.isfinite(drawn).all(axis=1)]
     for reaction, column in zip((run.normal_1.values, run.normal_2.values), drawn.T, strict=True):
         assert set(column) == set(reaction)
-    with pytest.raises(InputError, match="has no"):
-        found["reactions"](run.drop_vars("normal_2"), ax=Figure().add_subplot())
+    refused("has no", found["reactions"], run.drop_vars("normal_2"), ax=Figure().add_subplot())
 
 
 @pytest.mark.slow

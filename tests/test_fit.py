@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import on_belt
+from refusals import refused
 
 import ringsweep
 from ringsweep import cli, plots
-from ringsweep.errors import InputError
 from ringsweep.runs.fit import apart
 from ringsweep.statistics import unit_points
 
@@ -154,8 +154,7 @@ class TestCommand:
 
     def test_without_lmfit_one_line_says_how_to_get_it(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "lmfit", None)
-        with pytest.raises(InputError, match=r"pip install 'ringsweep\[fit\]'"):
-            ringsweep.fit(BELT, {"t": [1.0], "x": [0.1]}, "friction.mu_k")
+        refused(r"pip install 'ringsweep\[fit\]'", ringsweep.fit, BELT, {"t": [1.0], "x": [0.1]}, "friction.mu_k")
 
     def test_an_angle_is_drawn_in_the_unit_of_all_pictures(self):
         about = {"units": "rad", "long_name": "angle"}
@@ -165,8 +164,7 @@ class TestCommand:
         assert [line.get_ydata()[-1] for axes in (above, below) for line in axes.lines] == [180.0, 180.0, 0.0, 180.0]
 
     def test_a_sweep_is_no_fit(self):
-        with pytest.raises(InputError, match="is no fit"):
-            plots.fit(ringsweep.simulate(BELT))
+        refused("is no fit", plots.fit, ringsweep.simulate(BELT))
 
 
 def test_starts_reach_a_minimum_whose_points_are_not_among_the_best():

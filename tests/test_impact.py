@@ -6,12 +6,12 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 import pytest
 import xarray as xr
+from refusals import refused
 from rings import bump, course, particle, rubs, shape
 from scipy.optimize import linprog
 from tiers import mostly_slow
 
 import ringsweep
-from ringsweep.errors import InputError
 from ringsweep.physics.impact import Balls, Contact, Motion, contact_of, impulses
 from ringsweep.quantities.flags import AFTERMATHS, SEPARATING
 from ringsweep.quantities.variables import INFERRED
@@ -597,8 +597,7 @@ class TestRefused:
         ],
     )  # fmt: skip
     def test_what_has_no_impact_is_refused_with_its_place(self, change, solver, problem):
-        with pytest.raises(InputError, match=problem):
-            ringsweep.sweep(BODY | change, {"drive.amplitude": [1.0]}, solver=solver, progress=False)
+        refused(problem, ringsweep.sweep, BODY | change, {"drive.amplitude": [1.0]}, solver=solver, progress=False)
 
 
 #: A map in which all words of what follows a loss stand, within one regime.

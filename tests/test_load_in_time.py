@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from belts import on_belt, outcome
+from refusals import refused
 from test_functions_of_time import cells_of
 
 import ringsweep
@@ -51,8 +52,7 @@ def test_the_table_of_a_load_has_a_factor():
     cells = cells_of(braked(table))
     assert cells.drive.added.knots[0, 0, 1].tolist() == [0.0, 1.0, 4.0, -5.0]
     assert (cells.drive.added.amplitude, cells.drive.least_load) == (1.5, -7.5)
-    with pytest.raises(ringsweep.InputError, match=r"body\.load\.time: missing: a table needs a file"):
-        cells_of(braked({"amplitude": 2.0}))
+    refused(r"body\.load\.time: missing: a table needs a file", cells_of, braked({"amplitude": 2.0}))
 
 
 @pytest.mark.slow
@@ -93,5 +93,4 @@ def test_rk4_and_events_agree(friction, amplitude):
     ],
 )
 def test_mistakes_are_located(load, words):
-    with pytest.raises(ringsweep.InputError, match=words):
-        ringsweep.sweep(braked(load), {}, progress=False)
+    refused(words, ringsweep.sweep, braked(load), {}, progress=False)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from belts import on_belt, with_all_parts
+from refusals import refused
 
 import ringsweep
 from ringsweep.cli import main
@@ -234,8 +235,7 @@ class TestInput:
         ],
     )
     def test_arguments_out_of_range_are_refused(self, arguments, problem):
-        with pytest.raises(InputError, match=problem):
-            ringsweep.precision({"scene": BELT}, **arguments)
+        refused(problem, ringsweep.precision, {"scene": BELT}, **arguments)
 
     @pytest.mark.parametrize("part", ["grid", "points"])
     def test_sweep_over_several_laws_is_refused_with_its_path(self, part):

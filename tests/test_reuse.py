@@ -6,6 +6,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from refusals import refused
 
 import ringsweep
 from ringsweep import cli, plots
@@ -83,8 +84,7 @@ def test_sweep_over_laws_takes_cells_of_one_law_despite_other_parameters(scene, 
 def test_sweep_of_one_law_takes_its_cells_of_a_sweep_over_laws(scene, tmp_path, caplog):
     friction = {"friction": scene["friction"] | {"alpha": 1e3}}
     axes = {"drive.amplitude": AMPLITUDES, "friction.law": ["coulomb", "stiction"], "friction.alpha": [1e3, 2e3]}
-    with pytest.raises(InputError, match="no such number"):
-        ringsweep.sweep(scene | friction, axes, progress=False)
+    refused("no such number", ringsweep.sweep, scene | friction, axes, progress=False)
     laws = {"friction.law": ["tustin", "stiction"], **COARSE}
     ringsweep.sweep(scene | friction, laws, tmp_path / "l.nc", progress=False).close()
     assert taken(scene, COARSE, tmp_path / "l.nc", tmp_path, caplog) == 15
@@ -114,8 +114,7 @@ def test_file_of_another_version_is_refused(scene, earlier, tmp_path, monkeypatc
 
     known = reuse.identity
     monkeypatch.setattr(reuse, "identity", lambda config: known(config) | {"sources": "others"})
-    with pytest.raises(InputError, match="another version"):
-        ringsweep.sweep(scene, COARSE, reuse=earlier, progress=False)
+    refused("another version", ringsweep.sweep, scene, COARSE, reuse=earlier, progress=False)
 
 
 def test_file_with_units_of_earlier_versions_is_reused_repeated_and_drawn(scene, earlier, tmp_path, caplog):

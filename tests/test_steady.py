@@ -5,6 +5,7 @@ from math import exp
 import numpy as np
 import pytest
 from belts import on_belt
+from refusals import refused
 from solutions import cell_of
 
 import ringsweep
@@ -133,8 +134,7 @@ class TestHopfBifurcation:
     ],
 )
 def test_scene_without_steady_slip_is_refused_by_its_path(change, message):
-    with pytest.raises(InputError, match=message):
-        cell_of(launched({"law": "coulomb", "mu_k": 0.3}) | change)
+    refused(message, cell_of, launched({"law": "coulomb", "mu_k": 0.3}) | change)
 
 
 def test_chain_of_cells_cannot_start_at_steady_slip():
@@ -144,5 +144,4 @@ def test_chain_of_cells_cannot_start_at_steady_slip():
 
 
 def test_ring_has_no_such_launch(scene):
-    with pytest.raises(InputError, match=r"scene\.initial\.steady: unknown key"):
-        cell_of(scene | {"initial": {"steady": "slip"}})
+    refused(r"scene\.initial\.steady: unknown key", cell_of, scene | {"initial": {"steady": "slip"}})

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import on_belt, outcome
+from refusals import refused
 from scipy.optimize import brentq
 
 import ringsweep
@@ -150,5 +151,4 @@ def test_rk4_and_events_agree_under_a_smooth_law():
     ],
 )
 def test_mistakes_are_located(friction, words):
-    with pytest.raises(ringsweep.InputError, match=words):
-        ringsweep.sweep(conveyor(friction), {}, progress=False)
+    refused(words, ringsweep.sweep, conveyor(friction), {}, progress=False)
