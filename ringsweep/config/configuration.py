@@ -269,11 +269,9 @@ def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parame
         return
     if unit := other_unit(before, parameter):
         taken = f"{value} {parameter.unit}" if parameter.unit != "1" else f"{value}, without unit"
-        given, cure = form.format(value), form.format(f"{value} {unit}")
-        warn_once(
-            '%s %s is taken as %s, where the configuration says %s; was `%s "%s"` meant?',
-            *(option, given, taken, show(before), option, cure),
-        )
+        cure = f'{option} "{form.format(f"{value} {unit}")}"'
+        said = f"is taken as {taken}, where the configuration says {show(before)}; was `{cure}` meant?"
+        warn_once(f"{option} {form.format(value)} {said}")
 
 
 def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
@@ -289,21 +287,22 @@ def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
         if isinstance(node, dict) and key not in node:
             node[key] = {}
             doc.locations[".".join(parents[:depth])] = told
-        section, node = node, _child(node, key, full)
+        section, node = node, node[_place(node, key, full)]
     if last in WAYS and parents[-1] in SURFACE and not isinstance(node, dict):
         # A number that stands for both directions of sliding.
         node = section[parents[-1]] = dict.fromkeys(WAYS, node)
-    before = node.get(last) if isinstance(node, dict) else _child(node, last, full)
-    place: Any = last if isinstance(node, dict) else int(last)
+    place = _place(node, last, full)
+    before = node.get(last) if isinstance(node, dict) else node[place]
     node[place] = value
     doc.locations[full] = told
     return full, before
 
 
-def _child(node: Any, key: str, full: str) -> Any:
+def _place(node: Any, key: str, full: str) -> Any:
+    """What a key of a path stands for in a section or a list."""
     if isinstance(node, dict):
-        return node[key]
+        return key
     if isinstance(node, list) and key.isdecimal() and len(key) < 10 and int(key) < len(node):
-        return node[int(key)]
+        return int(key)
     stands = "" if isinstance(node, list) else f": {show(node)} stands in place of a section: write one there"
     raise InputError(full, f"cannot be set: there is no `{key}` on this path{stands}")

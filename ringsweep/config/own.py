@@ -251,6 +251,8 @@ INTERPOLATIONS["body.load"] = INTERPOLATIONS["force"]
 #: Keys of a section that stand for a table, by section.
 TABLE_KEYS = {of: (*columns, "file", *["interpolate"] * (of in INTERPOLATIONS)) for of, columns in TABLES.items()}
 
+_NO_JUMP = ": its place must not jump; for steps of its velocity give `law: formula` with velocity: piecewise(...)"
+
 # Share of the range of a table that a spline through it may leave; a sine with six rows a period leaves less.
 _OVERSHOOT = 0.1
 
@@ -264,11 +266,7 @@ _ROOM = 1e100
 def read_samples(doc: Document, given: dict[str, Any], section: str) -> tuple[Floats, Floats, str]:
     """Times, samples and interpolation of a drive or a force from a table; see :func:`read_table`."""
     known, where = INTERPOLATIONS[section], f"scene.{section}.interpolate"
-    problem = f"is no interpolation of a {section}"
-    if section == "drive":
-        problem += (
-            ": its place must not jump; for steps of its velocity give `law: formula` with velocity: piecewise(...)"
-        )
+    problem = f"is no interpolation of a {section}" + _NO_JUMP * (section == "drive")
     interpolate = one_of(given.get("interpolate", next(iter(known))), known, where, problem)
     times, samples = read_table(doc, given, section, 4 if interpolate == "spline" else 2)
     if interpolate == "spline":

@@ -181,10 +181,11 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     where = "sweep.sample"
     section = read_keys(given, KEYS, where)
     _check_number(section["method"], section["n"], section["replicates"])
+    time = Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
     own = {
         "factors": _factors(section.pop("of"), scene, axes),
         "quantiles": _quantiles(section["quantiles"], scene),
-        "survival": _survival(section["survival"], scene),
+        "survival": () if (asked := section["survival"]) is None else _ascending(asked, time, f"{where}.survival"),
     }
     found = Sample(**section | own)
     cells = math.prod(axes.sizes.values())
@@ -332,17 +333,12 @@ def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
     if not isinstance(given, dict) or not given:
         raise InputError(where, f"variables with lists of levels are expected, got {show(given)}")
     check_keys(given, outcome_numbers(scene), where, "is no number of this model")
-    levels = {name: read_values(levels, _LEVEL, f"{where}.{name}") for name, levels in given.items()}
-    return {name: tuple(np.unique(found).tolist()) for name, found in levels.items()}
+    return {name: _ascending(levels, _LEVEL, f"{where}.{name}") for name, levels in given.items()}
 
 
-def _survival(given: Any, scene: Scene) -> tuple[float, ...]:
-    if given is None:
-        return ()
-    time = Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
-    where = "sweep.sample.survival"
+def _ascending(given: Any, parameter: Parameter, where: str) -> tuple[float, ...]:
     read = read_spacing if isinstance(given, dict) else read_values
-    return tuple(np.unique(read(given, time, where)).tolist())
+    return tuple(np.unique(read(given, parameter, where)).tolist())
 
 
 @np.errstate(all="ignore")
