@@ -134,10 +134,10 @@ def _row_on_belt(scene, mode, forcing, y, seen):
     """Implement :func:`modes.row`: displacement, velocity, friction, deflection, and -1, 0 or 1 for the mode; zone."""
     x, velocity, friction = seen[:3]
     state = 0.0 if mode.region < 0 else float(mode.sign)
-    return x, velocity, friction, deflection(y, scene.law, 0.0), state, *zone_of(scene.surface, mode)
+    return x, velocity, friction, deflection(y, scene.law, 0.0), state, *zone_of(scene.surface, mode.place)
 
 
 @feature("()")
-def zone_of(surface, mode):
-    """Number of the zone in which a body is in a mode, 0 for none; an empty tuple if there are no zones."""
-    return (zones.coefficients(surface, mode.place[0])[2],)
+def zone_of(surface, place):
+    """Number of the zone of a place, as a mode has it, 0 for none; an empty tuple if there are no zones."""
+    return (zones.coefficients(surface, place[0])[2],)

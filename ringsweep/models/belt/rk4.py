@@ -9,8 +9,9 @@ from __future__ import annotations
 from math import nan
 
 from ringsweep.compile import feature
-from ringsweep.models.belt.creep import deflection
+from ringsweep.models.belt.creep import deflection, zone_of
 from ringsweep.models.belt.force import at_place, moving, slip_from
+from ringsweep.models.belt.switch import place_at
 from ringsweep.models.inspection import inspection, rates_in_space, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
 from ringsweep.physics import drives, zones
@@ -53,14 +54,8 @@ def _seen_in_constant_step_on_belt(scene, y, now):
 def _row_of_constant_step_on_belt(scene, y, forcing):
     """Implement :func:`constant_step.row`: the same columns as :func:`modes.row` on the belt."""
     now = constant_step.inspect(scene, y, forcing)
-    zone = _zone_at(scene.surface, y[0], forcing[0])
+    zone = zone_of(scene.surface, place_at(scene.surface, y[0], forcing[0]))
     return y[0], now.motion[2], now.friction, deflection(y, scene.law, 0.0), word_of_mode(scene, now), *zone
-
-
-@feature("()")
-def _zone_at(surface, x, shift):
-    """Number of the zone at `x` on a belt that has moved by `shift`, m; an empty tuple if there are no zones."""
-    return (zones.coefficients(surface, zones.locate(surface, zones.place_in(surface.frame, x, shift))[0])[2],)
 
 
 @constant_step.arc_share.implements(Belt)

@@ -45,7 +45,7 @@ def deflection_at_start(initial_z, scene):
 
 
 @feature("()")
-def _place_at(surface, x, shift):
+def place_at(surface, x, shift):
     """Segment and turn of the surface under a body at `x`, on a belt that has moved by `shift`, m."""
     return zones.locate(surface, zones.place_in(surface.frame, x, shift))
 
@@ -55,7 +55,7 @@ def _begin_on_belt(scene):
     """Implement :func:`modes.begin`; the state is ``(x, v)``, or ``(x, v, z)`` with bristles."""
     t, v = drives.beginning(scene.drive), drives.velocity_at_beginning(scene.drive, scene.initial_v)
     now, y = Instant(t, 0.0), joined((scene.initial_x, v), deflection_at_start(scene.initial_z, scene))
-    place = _place_at(scene.surface, y[0], drives.turn(scene.drive, now)[0])
+    place = place_at(scene.surface, y[0], drives.turn(scene.drive, now)[0])
     status, mode = mode_at(scene, place, now, y)
     status, mode, y = settled(scene.stops, scene, no_impact(scene.stops), now, y, status, mode)
     return t, y, status, mode
