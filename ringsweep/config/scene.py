@@ -132,16 +132,12 @@ def _zones(scene: dict[str, Any]) -> tuple[str, ...]:
 def _arcs(scene: dict[str, Any], zones: tuple[str, ...], leaves: Collection[str]) -> tuple[str, ...]:
     """Paths of the zones: of the list, or of the only one."""
     rough = [path for path in leaves if path.startswith("friction.rough.")]
-    if "zones" in scene:
-        for other in ("zone", *rough):
-            if other in scene or other in leaves:
-                raise InputError(f"scene.{other}", "cannot stand beside zones, each of which has its own values")
-        return zones
-    if "zone" in scene:
-        return ("zone",)
-    if rough:
+    if not zones and rough and "zone" not in scene:
         raise InputError(f"scene.{rough[0]}", "there is no zone: give zone, or leave friction.rough out")
-    return ()
+    for other in ("zone", *rough) if zones else ():
+        if other in scene or other in leaves:
+            raise InputError(f"scene.{other}", "cannot stand beside zones, each of which has its own values")
+    return zones or ("zone",) * ("zone" in scene)
 
 
 def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> Structure:

@@ -143,11 +143,7 @@ class Document:
         if self.is_result:
             # Results hold their tables, so this one was changed: it could name any file of the reader.
             logger.info("%s: read from %s", path, file)
-        try:
-            text = _read(file, _LARGEST_TABLE)
-        except InputError as error:
-            raise InputError(path, f"{file} {error.problem}") from None
-        rows = csv.reader(io.StringIO(text, newline=""), strict=True)
+        rows = csv.reader(io.StringIO(_read(file, _LARGEST_TABLE, path), newline=""), strict=True)
 
         def wrong(problem: str) -> InputError:
             return InputError(path, problem, file=str(file), line=rows.line_num or None)
@@ -205,20 +201,18 @@ def read(config: Source) -> Document:
     text, doc = _read(file, _LARGEST_CONFIGURATION), Document(file=file)
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
-        if not isinstance(node, yaml.MappingNode):
-            found = "is empty" if node is None else "holds no mapping"
-            raise InputError("", f"{found}: a configuration has the sections scene, solver and sweep", file=str(file))
-        with doc.locating_errors():
-            doc.tree = doc.plain(node)
-        return doc
-    except InputError:
-        raise
     # On escapes of characters that do not exist PyYAML raises ValueError or OverflowError.
     except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
         mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error)
         problem = "nested too deeply" if isinstance(error, RecursionError) else problem
         line = None if mark is None else mark.line + 1
         raise InputError("", f"not valid YAML: {' '.join(problem.split())}", file=str(file), line=line) from None
+    if not isinstance(node, yaml.MappingNode):
+        found = "is empty" if node is None else "holds no mapping"
+        raise InputError("", f"{found}: a configuration has the sections scene, solver and sweep", file=str(file))
+    with doc.locating_errors():
+        doc.tree = doc.plain(node)
+    return doc
 
 
 def is_result(file: Path) -> bool:
@@ -296,15 +290,14 @@ def _join(path: str, key: object) -> str:
     return f"{path}.{key}" if path else str(key)
 
 
-def _read(file: Path, largest: int) -> str:
+def _read(file: Path, largest: int, path: str = "") -> str:
+    """Text of a file that a path of a configuration names, or of the configuration itself."""
     try:
         with _opened(file) as content:
             if os.fstat(content.fileno()).st_size > largest:
                 raise OSError(f"it is larger than {largest / 1e6:g} MB")
             return content.read(largest).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError("", "cannot be read: not a text file in UTF-8", file=str(file)) from None
-    except OSError as error:
-        raise InputError("", f"cannot be read: {error.strerror or error}", file=str(file)) from None
-    except ValueError as error:
-        raise InputError("", f"cannot be read: {error}", file=repr(str(file))) from None
+    except (OSError, ValueError) as error:
+        cause = "not a text file in UTF-8" if isinstance(error, UnicodeDecodeError) else error
+        problem = f"cannot be read: {getattr(error, 'strerror', None) or cause}"
+        raise InputError(path, f"{file} {problem}" if path else problem, file=None if path else str(file)) from None
