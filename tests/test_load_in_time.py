@@ -38,13 +38,27 @@ def test_contact_opens_where_the_load_has_taken_the_weight_away():
     assert run.t_end.item() == pytest.approx(9.81 / 2.0, rel=1e-13)
 
 
-def test_a_body_that_slides_on_is_driven_by_a_pulsating_load():
-    mu, k, amplitude, omega, t = 0.2, 2.0, 4.0, 2.0 * np.pi * 0.7, 6.0
-    run = outcome(braked(pulsating(amplitude, 0.7), velocity=5.0, start=(0.0, 0.0)))
-    own, forced = np.sqrt(k), mu * amplitude / (k - omega**2)
+@pytest.mark.parametrize("amplitude", [4.0, 9.81])
+def test_a_body_that_slides_on_is_driven_by_a_pulsating_load(amplitude):
+    """A load of the amplitude of the weight touches zero in each period, and is not lost."""
+    mu, k, t, frequencies = 0.2, 2.0, 6.0, np.linspace(0.31, 1.9, 40)
+    scene = braked(pulsating(amplitude, 0.7), velocity=5.0, start=(0.0, 0.0))
+    run = ringsweep.sweep(scene, {"body.load.f": frequencies}, progress=False)
+    own, omega = np.sqrt(k), 2.0 * np.pi * frequencies
+    forced = mu * amplitude / (k - omega**2)
     x = mu * 9.81 / k * (1.0 - np.cos(own * t)) + forced * (np.sin(omega * t) - omega / own * np.sin(own * t))
-    assert run.x_end.item() == pytest.approx(x, abs=1e-10)
-    assert run.stick_time.item() == 0.0
+    assert run.x_end.values == pytest.approx(x, abs=1e-10)
+    assert (run.stick_time == 0.0).all()
+    assert run.certified.all()
+
+
+@pytest.mark.slow
+def test_a_load_that_stays_zero_is_lost_as_it_becomes_zero():
+    table = {"time": [0, 2, 3, 10], "load": [0, -9.81, 0, 0], "interpolate": "step"}
+    for scene, end in ((braked(table), 2.0), (braked(table | {"load": [-9.81, 0, 0, 0]}), 0.0)):
+        run = outcome(scene)
+        assert ringsweep.quantities.flags.REGIMES[run.regime.item()] == "separating"
+        assert run.t_end.item() == end
 
 
 def test_the_table_of_a_load_has_a_factor():

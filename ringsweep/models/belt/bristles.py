@@ -13,7 +13,7 @@ from ringsweep.compile import absorbed
 from ringsweep.models.belt.force import coefficients, length_scale
 from ringsweep.models.belt.mode import NORMAL, SLOW, Mode, after_guard, mode_at
 from ringsweep.models.belt.record import record_at_launch
-from ringsweep.models.belt.switch import deflection_at_start
+from ringsweep.models.belt.switch import after_load, deflection_at_start
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
@@ -109,7 +109,7 @@ def _after_guard_on_bristle_belt(scene, mode, guard, t, y):
     """Implement :func:`after_guard`; FAST is the guard of the bristles."""
     x, v, z = y
     if guard == NORMAL:
-        return SEPARATED_1, mode, y
+        return after_load(scene, mode, t, y)
     if guard == SLOW:
         return RUNNING, Mode(-mode.sign, BAND, -1, mode.place, ()), (x, 0.0, z)
     sign = float(mode.sign)

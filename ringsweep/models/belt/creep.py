@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf, nan
 
 from ringsweep.compile import feature, inlined, unrolled
-from ringsweep.models.belt.force import coefficients, if_force, in_segment, length_scale, located
+from ringsweep.models.belt.force import coefficients, if_force, in_segment, length_scale, located, rounding_of_load
 from ringsweep.models.belt.mode import yields
 from ringsweep.models.belt.stops import guarded, held_linear, held_rates, is_away
 from ringsweep.models.interface import implicit, modes
@@ -88,7 +88,7 @@ def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
     normal, _ = ring.reactions(body, *now.K, now.motion)
     friction = now.damping * body.mass * x[1] - now.K[0] * normal
     place, _, velocity = now.motion
-    guards = all_guards(body, normal, *region_guards(scene, mode, common, x))
+    guards = all_guards(body, normal + rounding_of_load(scene, place), *region_guards(scene, mode, common, x))
     guards = _with_edges(scene.surface, guards, mode.place, place, forcing[0])
     guards, acceleration = guarded(scene.stops, guards, mode, place, acceleration)
     return guards, (place, velocity, acceleration, friction, x[0], x[1], forcing[2], deflection(x, scene.law, nan))

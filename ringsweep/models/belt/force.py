@@ -137,6 +137,21 @@ def rounding_of_reserve(scene, motion, acceleration):
 
 
 @inlined
+def rounding_of_load(scene, x):
+    """More than the rounding of the load at the displacement `x`, N: a load that falls so far only touches zero."""
+    # The terms of the load may cancel at one of both places.
+    there = ring.reactions(scene.body, 0.0, 0.0, (x, 0.0, 0.0))[0]
+    return _ROUNDING * (abs(there) + abs(ring.reactions(scene.body, 0.0, 0.0, (-x, 0.0, 0.0))[0]))
+
+
+@inlined
+def load_is_left(scene, t, x):
+    """Whether the normal reaction of a body at the displacement `x` is positive, or zero but for rounding."""
+    load = ring.reactions(belt.laden_at(scene.drive, scene, t).body, 0.0, 0.0, (x, 0.0, 0.0))[0]
+    return load >= -0.5 * rounding_of_load(scene, x)
+
+
+@inlined
 def stuck_rates(scene, t, x, forcing):
     """Time derivatives of :func:`stuck_pull` and of the load of a body at rest on the belt, N/s."""
     _, velocity, acceleration = forcing[:3]

@@ -19,6 +19,7 @@ from ringsweep.models.belt.force import (
     in_segment,
     length_scale,
     located,
+    rounding_of_load,
     rounding_of_reserve,
     speed_scale,
 )
@@ -133,6 +134,7 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
     """Implement :func:`series.fill_table`: fill all rows of the table, in stick, in a dead band, or in slip."""
     drives.expand_at(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
     expand_load(scene.drive, t, ORDER, c[LOAD], c[FACTORS:])
+    least_load = rounding_of_load(scene, y[0])
     scene = _laden_after(scene.drive, in_segment(scene.surface, scene, mode.place), c, 0.0)
     body = scene.body
     if if_force(body, True, False):
@@ -175,11 +177,8 @@ def _fill_table_on_belt(scene, mode, t, y, tolerance, c):
             size = (abs(c[FORCE, 0]) + ring.size(body, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]))) / body.mass
             if abs(c[V, 1]) <= 1e-12 * size:
                 c[SLOW, 1] = 0.0
-    if ring.if_load_varies(body, c[NORMAL, 0] == 0.0, False):
-        # The load has yet to grow, or never does.
-        for row in (NORMAL, SLOW, FAST):
-            if row == NORMAL or mode.sign == 0:
-                divide_by_time(c[row], 0)
+    if ring.if_load_varies(body, True, False):
+        _guard_load(c, least_load, mode.sign == 0)
     _expand_edges(scene.surface, mode, c)
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     velocity = abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1])
@@ -217,6 +216,19 @@ def _expand_edges(surface, mode, c):
 def _has_dead_band(scene):
     """Whether a set-valued law holds the body at all sliding speeds below a positive bound, as Karnopp's does."""
     return holds_in_band(scene.law) and stiction_band(scene.law) > 0.0
+
+
+@inlined
+def _guard_load(c, least, sticks):
+    """Make the normal reaction a guard: it may touch zero, but not stay there. It may have yet to grow, at launch."""
+    if c[NORMAL, 0] == 0.0:
+        for row in (NORMAL, SLOW, FAST):
+            if (row == NORMAL and least == 0.0) or (row != NORMAL and sticks):
+                divide_by_time(c[row], 0)
+    stays = c[NORMAL, 0] <= least
+    for k in range(1, ORDER + 1):
+        stays = stays and c[NORMAL, k] == 0.0
+    c[NORMAL, 0] = -1.0 if stays else c[NORMAL, 0] + least
 
 
 @inlined

@@ -12,6 +12,7 @@ from ringsweep.models.belt.force import (
     coefficients,
     direction,
     in_segment,
+    load_is_left,
     moving,
     rounding_of_reserve,
     stuck_pull,
@@ -79,9 +80,8 @@ def _after_jump_on_belt(scene, mode, t, y, jump):
 def _mode_at_on_belt(scene, place, t, y):
     """Implement :func:`mode_at`."""
     (x, v), scene = y, in_segment(scene.surface, scene, place)
-    laden = belt.laden_at(scene.drive, scene, t)
     status, mode = RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1, place, ())
-    if ring.if_load_varies(scene.body, True, False) and ring.reactions(laden.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
+    if ring.if_load_varies(scene.body, True, False) and not load_is_left(scene, t, x):
         status, mode = SEPARATED_1, Mode(0, KINETIC, -1, place, ())
     elif holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
         mode = mode_at_rest(scene, place, t, x)
@@ -114,12 +114,21 @@ def _loose(scene, place, sign):
     return Mode(sign, region_at(scene.law, 0.0), SLOW if stiction_band(scene.law) == 0.0 else -1, place, ())
 
 
+@inlined
+def after_load(scene, mode, t, y):
+    """Status, mode and state after the normal reaction has reached zero, by the series or the step at least."""
+    # As for the breakaway force, one more, short step decides.
+    if mode.entry_guard != NORMAL and load_is_left(scene, t, y[0]):
+        return RUNNING, Mode(mode.sign, mode.region, NORMAL, mode.place, ()), y
+    return SEPARATED_1, mode, y
+
+
 @after_guard.implements(belt.Belt)
 def _after_guard_on_belt(scene, mode, guard, t, y):
     """Implement :func:`after_guard`; `guard` is NORMAL, SLOW or FAST, or an edge."""
     x, _ = y
     if guard == NORMAL:
-        return SEPARATED_1, mode, y
+        return after_load(scene, mode, t, y)
     sign, region, place = mode.sign, mode.region, mode.place
     if guard > FAST:
         place = _beyond(scene.surface, place, 1 if guard == EDGE_ABOVE else -1)
