@@ -7,7 +7,7 @@ is the index of a guard, `s` and `h` are lengths of steps, s.
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -343,7 +343,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         h_norm = _error_norm(error, scales, linear)
         if not h_norm <= 1.0:
             # The step up to an event has stages of its own and may have a larger error.
-            s = h = h * (max(0.2, 0.9 * h_norm**-0.2) if isfinite(h_norm) else 0.1)
+            s = h = h * max(0.2, 0.9 * h_norm**-0.2)
             event = -1
             continue
         taken = Taken(h, x_next)
