@@ -10,6 +10,7 @@ from ringsweep.models.ring.impact.mode import BOTH
 from ringsweep.models.ring.impact.switch import motion_of
 from ringsweep.models.ring.series import HISTORY as OF_RING
 from ringsweep.models.ring.series import with_places
+from ringsweep.numerics.terms import joined
 from ringsweep.physics import ring
 from ringsweep.physics.impact import ImpactRing, contact_of
 from ringsweep.physics.zones import locate
@@ -32,8 +33,7 @@ def _row_with_impact(scene, mode, forcing, y, seen):
     place_1 = locate(surface, first.alpha - theta) if contacts.open % 2 == 1 else mode.place_1
     place_2 = locate(surface, second.alpha - theta) if contacts.open >= 2 else mode.place_2
     of_ring = modes.row(scene.closed, with_places(mode, place_1, place_2), forcing, y[:2], seen)
-    return (
-        *of_ring[:-1],
+    own = (
         0.0 if contacts.open == BOTH else of_ring[-1],
         motion.x,
         motion.y,
@@ -46,3 +46,4 @@ def _row_with_impact(scene, mode, forcing, y, seen):
         event.speed,
         event.impulse,
     )
+    return joined(of_ring[:-1], own)
