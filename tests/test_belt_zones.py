@@ -117,7 +117,7 @@ def test_history_tells_the_zone_and_the_edges():
     inside = (run.x > 0.2 + 1e-9) & (run.x < 0.4 - 1e-9)
     assert (run.zone_1.values[inside.values] == 1).all()
     assert inside.any()
-    edges = run.event_time.values[[kind == "edge" for kind in kinds(run)]]
+    edges = run.event_time.values[ringsweep.words(run.event_kind).values == "edge"]
     before, after = (np.sqrt(4.0 - 2.0 * G * work) for work in (0.1 * 0.2, 0.1 * 0.2 + 0.4 * 0.2))
     assert edges == pytest.approx([(2.0 - before) / 0.1 / G, (2.0 - before) / 0.1 / G + (before - after) / 0.4 / G])
 
@@ -130,12 +130,6 @@ def test_a_run_that_goes_on_finds_the_zones_where_they_are_by_then(tmp_path):
     del scene["initial"]
     rest = outcome(scene | {"initial": {"from": str(first)}, "time": {"span": 1.7}})
     np.testing.assert_allclose([rest.x_end, rest.velocity_end], [whole.x_end, whole.velocity_end], atol=1e-9)
-
-
-def kinds(run):
-    """Words of the events of a run."""
-    names = dict(zip(run.event_kind.attrs["flag_values"], run.event_kind.attrs["flag_meanings"].split(), strict=True))
-    return [names[kind] for kind in run.event_kind.values]
 
 
 @pytest.mark.parametrize(

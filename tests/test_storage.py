@@ -12,7 +12,6 @@ from refusals import refused
 
 import ringsweep
 from ringsweep import plots
-from ringsweep.errors import InputError
 from ringsweep.plots.films import check_animation
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.storage import files, netcdf, provenance
@@ -103,9 +102,7 @@ def test_saving_follows_a_symbolic_link_and_keeps_usual_permissions(sweep, tmp_p
 )
 def test_unwritable_path_is_refused(tmp_path, name, problem):
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match=problem) as caught:
-        files.check_writable(tmp_path / name)
-    assert caught.value.path == str(tmp_path / name)
+    assert refused(problem, files.check_writable, tmp_path / name).path == str(tmp_path / name)
     assert os.listdir(tmp_path) == ["file"]
 
 
