@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import product
 from math import pi
-from types import MappingProxyType
 from typing import Any
 
 from ringsweep.config import own
@@ -77,7 +76,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     # Name a misspelt key, rather than the key that is missing because of it.
     known = own.law_choice(model, defined).names
     registered = MODELS[model], WITH_IMPACT.get(model), *map(LAWS.get, known), *DRIVES.values()
-    keys = _keys(moved, known, tuple(defined.items()), zones or ("zones.0",), *registered)
+    keys = _keys(moved, known, tuple(defined.items()), zones or ("zones.0",), (*DRIVES, own.FORMULA), *registered)
     leaves = dict(keys.leaves(scene, names))
     if not names:
         section_of(scene, "friction", "scene.")
@@ -312,13 +311,14 @@ class _Keys:
         self,
         moved: Structure,
         laws: Collection[str],
-        defined: Mapping[str, type] = MappingProxyType({}),
+        defined: tuple[tuple[str, type], ...] = (),
         zones: tuple[str, ...] = ("zones.0",),
         drives: Collection[str] = (*DRIVES, own.FORMULA),
+        *_registered: Any,
     ):
         self.moved, self.defined, self.zones = moved, defined, zones
         rest = {"elsewhere": moved.elsewhere, "two_way": moved.two_way, "frame": moved.frame}
-        structures = [*structures_of(moved.model, laws, defined, zones, drives, **rest)]
+        structures = [*structures_of(moved.model, laws, dict(defined), zones, drives, **rest)]
         structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
         paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
         paths |= dict.fromkeys(path for structure in structures for path in parameters(structure))
@@ -376,7 +376,5 @@ class _Keys:
         return " or ".join(f"`{path}`" for path in sorted(found))
 
 
-@lru_cache(maxsize=16)
-def _keys(moved: Structure, laws: tuple[str, ...], defined: Any, zones: tuple[str, ...], *registered: Any) -> _Keys:
-    """Keys of a scene, found once for as long as the same types are registered under its names."""
-    return _Keys(moved, laws, dict(defined), zones)
+# Keys of a scene, found once for as long as the same types are registered under its names.
+_keys = lru_cache(maxsize=16)(_Keys)
