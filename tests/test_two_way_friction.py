@@ -8,6 +8,9 @@ from refusals import refused
 from scipy.optimize import brentq
 
 import ringsweep
+from ringsweep.physics.friction.laws import Definition, define
+from ringsweep.physics.friction.speeds import hidden_fields
+from ringsweep.physics.friction.velocity import EXPRESSIONS
 
 NAMES = "regime", "t_end", "x_end", "velocity_end", "x_min", "x_max", "stick_time", "first_slip", "force_max", "slips"
 
@@ -138,6 +141,72 @@ def test_rk4_and_events_agree_under_a_smooth_law():
     assert run.certified.item() == 1
 
 
+def by_formula(mu, **rest):
+    """Friction by formula that holds a body at rest up to ``mu_s``."""
+    return {"law": "formula", "mu": mu, "at_rest": "mu_s", **rest}
+
+
+@pytest.mark.slow
+def test_ratchet_by_formula_drifts_at_the_speed_of_closed_form():
+    amplitude, frequency, mu = 5.0, 0.5, 0.2
+    omega = 2.0 * np.pi * frequency
+    begin = np.arcsin(mu * 9.81 / amplitude) / omega
+    length = brentq(lambda s: _slide(s, begin, amplitude, omega, mu)[0], 0.1, 1.0 / frequency, xtol=1e-15)
+    run = outcome(conveyor(by_formula("mu_k*(2 - direction)", mu_s={"forward": mu, "backward": 3.0 * mu}, mu_k=mu)))
+    assert run.drift.item() == pytest.approx(_slide(length, begin, amplitude, omega, mu)[1] * frequency, rel=1e-10)
+    assert run.certified.item() == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", [{"method": "auto"}, {"method": "rk4", "steps": 3000}])
+@pytest.mark.parametrize("model", ["ring", "ring-single-contact"])
+def test_direction_in_a_formula_is_friction_typed_each_way_on_a_ring(model, method):
+    static, places = {"forward": 0.3, "backward": 0.6}, {"rough": 1.0, "elsewhere": 0.5}
+    scaled = lambda share, numbers: {way: share * mu for way, mu in numbers.items()}  # noqa: E731
+    typed = {place: {"mu_s": scaled(k, static), "mu_k": scaled(0.8 * k, static)} for place, k in places.items()}
+    formula = {place: {"mu_s": scaled(k, static), "mu_k": 0.24 * k} for place, k in places.items()}
+    runs = [
+        ringsweep.sweep(
+            on_ring(model, friction, drive={"law": "sinusoidal", "frequency": 1.0}, initial={"omega": 2.0}),
+            {"drive.amplitude": np.linspace(0.1, 3.0, 8)},
+            solver=method,
+            progress=False,
+        )
+        for friction in ({"law": "stiction", **typed}, by_formula("mu_k*piecewise(direction > 0, 1, 2)", **formula))
+    ]
+    for name in ("regime", "t_end", "phi_end", "omega_end", "stick_time", "normal_min_1", "reversals"):
+        np.testing.assert_allclose(*(run[name] for run in runs), rtol=1e-12, atol=1e-12)
+    assert method["method"] == "rk4" or all((run.certified == 1).all() for run in runs)
+
+
+@pytest.mark.slow
+def test_rk4_and_events_agree_under_a_smooth_formula_of_the_signed_velocity():
+    mu = "mu_k*tanh(v/(w*(1 + g*direction))) + c*max(direction*v - v1, 0)"
+    friction = {"law": "formula", "mu": mu, "mu_k": 0.3, "w": 0.02, "g": 0.4, "c": 0.2, "v1": 0.1}
+    scene = conveyor(friction, stiffness=8.0, velocity=0.2, force=(12.0, 0.4), start=(0.1, 0.3), span=6.0)
+    run, coarse = outcome(scene), outcome(scene, method="rk4", steps=60000)
+    assert run.x_end.item() == pytest.approx(coarse.x_end.item(), abs=1e-6)
+    assert run.certified.item() == 1
+
+
+def test_a_formula_switches_each_way_at_the_speed_of_that_way():
+    mu = "mu_k + c*max(v - v1*(2 - direction), 0)"
+    found = define(Definition(mu, "mu_k"))
+    columns = {"c": np.array([0.1]), "v1": np.array([0.5])}
+    surfaces = [(np.array([0.3]), np.array([0.3]))] * 2
+    fields = hidden_fields(EXPRESSIONS[found], columns, surfaces)
+    assert fields["edges"][0, :3].tolist() == pytest.approx([0.5, 1.5, np.inf])
+
+
+def test_a_formula_may_end_in_one_direction_only():
+    """Backwards friction turns negative at 2 m/s; forwards it never does."""
+    found = define(Definition("mu_k*(1 + direction*v/w)", "mu_k"))
+    surfaces = [(np.array([0.3]), np.array([0.3]))] * 2
+    fields = hidden_fields(EXPRESSIONS[found], {"w": np.array([2.0])}, surfaces)
+    assert np.isinf(fields["thresholds"]).all()
+    assert fields["thresholds_back"].min() == pytest.approx(2.0)
+
+
 @pytest.mark.parametrize(
     ("friction", "words"),
     [
@@ -148,7 +217,17 @@ def test_rk4_and_events_agree_under_a_smooth_law():
             {"law": "bristle", "mu_k": {"forward": 0.3, "backward": 0.2}, "sigma0": 1e4},
             "scene.friction.mu_k: not available with law bristle",
         ),
+        (by_formula("mu_k*piecewise(direction > 1, 1, 2)", mu_s=0.3, mu_k=0.1), "such as v < v1, or is direction > 0"),
+        (by_formula("mu_k*(1 + direction*v)", mu_s=0.3, mu_k=0.1), "scene.friction.mu: .* units do not fit"),
+        (by_formula("mu_k*(2 - direction)", mu_s=0.3, mu_k=0.2), "it begins to slip with friction 0.6, more than"),
+        (by_formula("mu_k", mu_s=0.3, mu_k=0.2, direction=1.0), "scene.friction.direction"),
     ],
 )
 def test_mistakes_are_located(friction, words):
     refused(words, ringsweep.sweep, conveyor(friction), {}, progress=False)
+
+
+def test_a_formula_of_the_direction_is_refused_beside_impact():
+    scene = on_ring("ring", by_formula("mu_k*(2 - direction)", elsewhere={"mu_s": 0.6, "mu_k": 0.2}))
+    problem = "scene.friction.law: friction cannot depend on the direction of sliding beside impact"
+    refused(problem, ringsweep.simulate, scene | {"impact": {"restitution": 0.5}})

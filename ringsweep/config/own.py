@@ -35,7 +35,7 @@ TABLE_LAW = "table"
 
 #: Keys of a law by formula.
 LAW_KEYS: Keys = {
-    "mu": Key("friction coefficient as a formula of the sliding speed v", example=FRICTION.example),
+    "mu": Key("friction coefficient as a formula of the sliding speed v and its direction", example=FRICTION.example),
     "at_rest": Key("coefficient up to which friction holds at rest; without it the law is smooth"),
 }
 
@@ -60,8 +60,9 @@ def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:
     name : str
         Name of the law in scenes: ``friction: {law: NAME}``. A law of your own with this name is replaced.
     mu : str
-        Friction coefficient as a formula of the sliding speed ``v`` (m/s), of the coefficients ``mu_s`` and ``mu_k`` of
-        the surface, and of parameters, which the scene gives; see ``docs/laws.md``.
+        Friction coefficient as a formula of the sliding speed ``v`` (m/s) and of its ``direction`` (1 or -1), of the
+        coefficients ``mu_s`` and ``mu_k`` of the surface, and of parameters, which the scene gives; see
+        ``docs/laws.md``.
     at_rest : str, optional
         ``"mu_s"`` or ``"mu_k"``: at rest friction holds up to this coefficient. Without it the law is smooth, and
         friction vanishes at v = 0.

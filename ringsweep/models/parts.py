@@ -98,10 +98,10 @@ def zone_parameters(structure: Structure, zone: type, rest: str) -> dict[str, Pa
 def surface_from(structure: Structure, values: Values, zone: Any, period: Any = 2.0 * np.pi) -> tuple[Any, list[Any]]:
     """Surface with zones of a type, and pairs of friction coefficients of all parts; see :func:`zones.surface_of`.
 
-    Without a type of zone, coefficients have no place of their own. If they depend on the direction, the pairs of
-    forward sliding come before those of backward sliding.
+    Without a type of zone, coefficients have no place of their own. If they or the law depend on the direction, the
+    pairs of forward sliding come before those of backward sliding.
     """
-    if not structure.two_way:
+    if not structure.by_direction:
         return _surface_one_way(structure, values, zone, period)
     given = [path for path in structure.two_way if f"{path}.{WAYS[0]}" in values]
     of_ways = ({path: values[f"{path}.{way}"] for path in given} for way in WAYS)

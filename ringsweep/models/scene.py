@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ringsweep.errors import InputError
 from ringsweep.physics.drives import DRIVES, FORMULAS
 from ringsweep.physics.friction import LAWS
+from ringsweep.physics.friction.velocity import EXPRESSIONS
 
 Values = Mapping[str, NDArray[np.float64]]
 
@@ -115,6 +116,12 @@ class Structure:
     def law_type(self) -> type:
         """Type of the friction law."""
         return self.own_law or LAWS[self.law]
+
+    @property
+    def by_direction(self) -> tuple[str, ...]:
+        """Paths of what makes friction depend on the direction of sliding; empty if it does not."""
+        expression = EXPRESSIONS.get(self.law_type)
+        return (*self.two_way, LAW) if expression is not None and expression.signed else self.two_way
 
     @property
     def drive_type(self) -> type:

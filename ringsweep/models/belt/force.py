@@ -16,7 +16,7 @@ from ringsweep.physics.belt import OnBelt
 from ringsweep.physics.forces import force_in, force_rate, largest_force, load_rate
 from ringsweep.physics.friction.registry import dead_band
 from ringsweep.physics.friction.velocity import friction_at
-from ringsweep.physics.friction.ways import TwoWay, along, facing
+from ringsweep.physics.friction.ways import TwoWay, along, towards
 
 
 @feature("no", of=ring.having(OnBelt, "force"), absorb=True)
@@ -85,8 +85,8 @@ def at_place(surface, scene, x, shift):
 
 @absorbed
 def coefficients(scene, way):
-    """Static and kinetic friction coefficient in a direction; see :func:`ringsweep.physics.friction.ways.along`."""
-    return facing((scene.mu_s, scene.mu_k), way)
+    """Static and kinetic friction coefficient in a direction; see :func:`ringsweep.physics.friction.ways.towards`."""
+    return towards(scene.law, (scene.mu_s, scene.mu_k), way)
 
 
 @absorbed

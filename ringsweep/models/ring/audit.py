@@ -24,7 +24,7 @@ from ringsweep.models.sliding import REACTION_TOLERANCE, audited, imbalances, la
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.velocity import friction_at
-from ringsweep.physics.friction.ways import TwoWay, along, facing
+from ringsweep.physics.friction.ways import TwoWay, along, towards
 from ringsweep.physics.zones import Segments, edge_ahead, roughest
 from ringsweep.quantities.flags import SEPARATING
 
@@ -42,7 +42,7 @@ def _names_wrong_segment(scene, mode, rho, under):
     `under` has the coefficients under the contacts, as :func:`ring.coefficients_at` returns them.
     """
     way = float(mode.sign)
-    of_mode, under = facing(coefficients_under(scene, mode), way), facing(under, way)
+    of_mode, under = towards(scene.law, coefficients_under(scene, mode), way), towards(scene.law, under, way)
     offset = ring.contact_offset(scene.body)
     wrong = False
     for place, angle, assumed, found in (
@@ -73,7 +73,7 @@ def _violation_on_ring(scene, mode, forcing, y, rates, s, tolerance):
         largest, relaxation = larger(largest, -reserve / (body.mass * terms * REACTION_TOLERANCE * tolerance)), 0.0
     else:
         sign = 1.0 if v > 0.0 else -1.0
-        mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), facing(under, sign))
+        mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), towards(scene.law, under, sign))
         K1, K2 = -sign * mu_1, -sign * mu_2
         _, determinant = ring.acceleration(body, K1, K2, motion)
         normal_1, normal_2 = ring.reactions(body, K1, K2, motion)
@@ -101,7 +101,7 @@ def _audited_on_bristle_ring(scene, mode, forcing, y):
     rho, v, _, _ = y
     body, phi, omega = scene.body, rho + forcing[0], v / scene.body.radius + forcing[1]
     under, sign = ring.coefficients_at(scene, rho), 1.0 if v >= 0.0 else -1.0
-    now = slip_of(scene, facing(under, sign), (sin(phi), cos(phi), omega), y, sign, mode.region)
+    now = slip_of(scene, towards(scene.law, under, sign), (sin(phi), cos(phi), omega), y, sign, mode.region)
     terms = body.gravity + body.radius * (omega * omega + abs(forcing[2]))
     return now, terms, inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
 

@@ -40,7 +40,7 @@ from ringsweep.numerics.functions import select, sine_cosine_from
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.bristles import region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
-from ringsweep.physics.friction.ways import along, facing
+from ringsweep.physics.friction.ways import along, towards
 from ringsweep.physics.ring import BristleRing
 from ringsweep.physics.zones import roughest
 
@@ -80,7 +80,7 @@ def _initial_deflections(scene):
     """Deflections at launch, m."""
     v = ring.launch_velocity(scene) * scene.body.radius
     rho = scene.initial_phi - drives.turn(scene.drive, 0.0)[0]
-    mu_s1, mu_k1, mu_s2, mu_k2 = facing(ring.coefficients_at(scene, rho), v)
+    mu_s1, mu_k1, mu_s2, mu_k2 = towards(scene.law, ring.coefficients_at(scene, rho), v)
     return steady_deflection(scene.law, mu_s1, mu_k1, v), steady_deflection(scene.law, mu_s2, mu_k2, v)
 
 
@@ -96,7 +96,7 @@ def _slip_in_space_on_bristle_ring(scene, y, v, forcing, angle):
     """Implement :func:`slip_in_space`; what it adds to the slip is 1 if the body counts as stuck, else 0."""
     rho, _, z_1, z_2 = y[0] - forcing[0], y[1], y[2], y[3]
     sign = select(v >= 0.0, 1.0, -1.0)
-    under = facing(ring.coefficients_at(scene, rho), sign)
+    under = towards(scene.law, ring.coefficients_at(scene, rho), sign)
     stuck = select(_region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0, 1.0, 0.0)
     return slip_of(scene, under, (*angle, y[1]), (rho, v, z_1, z_2), sign, BAND), stuck
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ringsweep.compile import inlined
 from ringsweep.physics import ring
 from ringsweep.physics.friction.velocity import friction_in
-from ringsweep.physics.friction.ways import facing
+from ringsweep.physics.friction.ways import towards
 from ringsweep.physics.zones import coefficients, cross_edge, edge_ahead, leave_edge, locate
 
 
@@ -56,8 +56,8 @@ def coefficients_under(scene, mode):
 
 @inlined
 def coefficients_in_slip(scene, mode):
-    """``(mu_s1, mu_k1, mu_s2, mu_k2)`` in the segments that a mode names, and in the direction of its slip."""
-    return facing(coefficients_under(scene, mode), float(mode.sign))
+    """What the law takes of the segments that a mode names; see :func:`ringsweep.physics.friction.ways.towards`."""
+    return towards(scene.law, coefficients_under(scene, mode), float(mode.sign))
 
 
 @inlined

@@ -36,7 +36,7 @@ class Common(NamedTuple):
     per_radius : float
         Reciprocal of the radius of the ring, 1/m.
     surfaces : tuple of float
-        Coefficients of the surfaces under contacts 1 and 2.
+        What the law takes of the surfaces under contacts 1 and 2.
     """
 
     rho: float
@@ -44,7 +44,7 @@ class Common(NamedTuple):
     sin_phi: float
     cos_phi: float
     per_radius: float
-    surfaces: tuple[float, float, float, float]
+    surfaces: tuple[float, ...]
 
 
 @implicit.common.implements(ring.Ring, ring.BristleRing)

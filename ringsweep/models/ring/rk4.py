@@ -13,7 +13,7 @@ from ringsweep.models.slip import Slip
 from ringsweep.numerics.functions import opposing, sine_cosine, sine_cosine_carried
 from ringsweep.physics import zones
 from ringsweep.physics.friction.velocity import friction_at
-from ringsweep.physics.friction.ways import facing
+from ringsweep.physics.friction.ways import towards
 from ringsweep.physics.ring import BristleRing, Ring, coefficients_at
 
 
@@ -26,7 +26,7 @@ def _initial_state_on_ring(scene):
 @slip_in_space.implements(Ring)
 def _slip_in_space_on_ring(scene, y, v, forcing, angle):
     """Implement :func:`slip_in_space`; nothing is added to the slip."""
-    under = facing(coefficients_at(scene, y[0] - forcing[0]), v)
+    under = towards(scene.law, coefficients_at(scene, y[0] - forcing[0]), v)
     mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), under)
     friction, slopes = (opposing(mu_1, v), opposing(mu_2, v)), (-slope_1, -slope_2)
     return Slip((*angle, y[1]), y[1] - forcing[1], friction, slopes, 0.0, ()), ()

@@ -214,7 +214,8 @@ def slipping(scene, mode, rho, slip):
 @inlined
 def _at_breakaway(scene, mode):
     """Friction coefficients under contacts 1 and 2 as slip begins; static if the law does not drop there."""
-    mu_s1, _, mu_s2, _ = surfaces = coefficients_in_slip(scene, mode)
+    surfaces = coefficients_in_slip(scene, mode)
+    mu_s1, mu_s2 = surfaces[0], surfaces[2]
     mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, 0.0, surfaces)
     # Friction that does not drop at breakaway is static friction, without the rounding of the formula.
     return (
@@ -347,8 +348,9 @@ def _status_when_stalled_on_ring(scene, mode, t, y):
     if mode.sign == 0:
         return BROKEN
     # Where friction changes fast with the speed, the determinant does not show the jam: test with static coefficients.
-    mu_s1, _, mu_s2, _ = coefficients_in_slip(scene, mode)
-    _, determinant = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, (0.0, 1.0, 0.0))
+    surfaces = coefficients_in_slip(scene, mode)
+    K1, K2 = -mode.sign * surfaces[0], -mode.sign * surfaces[2]
+    _, determinant = ring.acceleration(scene.body, K1, K2, (0.0, 1.0, 0.0))
     return JAM if is_jamming(scene, mode, t, y) or not determinant > 0.0 else BROKEN
 
 

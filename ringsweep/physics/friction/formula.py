@@ -1,7 +1,7 @@
 """Formulas of friction laws: from text to expressions, and the units of their parameters.
 
-The text is read with Python's grammar, but it is never run. Names are the sliding speed ``v``, the coefficients
-``mu_s`` and ``mu_k`` of the surface, ``pi``, and parameters of the law.
+The text is read with Python's grammar, but it is never run. Names are the sliding speed ``v``, its ``direction``, the
+coefficients ``mu_s`` and ``mu_k`` of the surface, ``pi``, and parameters of the law.
 
 `within` lists the switches within which a part of the formula stands: pairs of an index of a threshold, and whether
 the part holds below it. Nothing here runs in kernels.
@@ -22,7 +22,7 @@ from ringsweep.numerics import expressions
 from ringsweep.numerics.expressions import SPEED, Node, number, symbol
 
 #: Fields of a law that follow from its parameters.
-HIDDEN = ("slope_at_rest", "slope_beyond", "edges", "thresholds", "pieces", "band", "in_band")
+HIDDEN = ("slope_at_rest", "slope_beyond", "edges", "thresholds", "thresholds_back", "pieces", "band", "in_band")
 
 #: Names that no parameter can have: those of the formula, keys of the section ``friction``, and what a law has besides.
 RESERVED = frozenset(
@@ -32,6 +32,9 @@ RESERVED = frozenset(
 
 #: Coefficients of the surface.
 COEFFICIENTS = ("mu_s", "mu_k")
+
+#: Direction of sliding: 1 forwards, -1 backwards.
+DIRECTION = symbol("direction")
 
 # Longest text, in characters, and deepest nesting.
 _LONGEST, _DEEPEST = 2000, 60
@@ -66,10 +69,16 @@ class Language:
     example: str
 
     @property
+    def signed(self) -> bool:
+        """Whether formulas may have the direction of sliding."""
+        return DIRECTION.value in self.units
+
+    @property
     def grammar(self) -> str:
         """What is allowed, in words."""
         x, functions = self.name, " ".join([*self.functions, "min", "max"])
-        return f"numbers, {x}, names of parameters, + - * / **, {functions}, piecewise({x} < {x}1, a, b)"
+        names = f"{x}, {'direction, ' * self.signed}names of parameters"
+        return f"numbers, {names}, + - * / **, {functions}, piecewise({x} < {x}1, a, b)"
 
 
 #: The language of friction laws.
@@ -78,7 +87,7 @@ FRICTION = Language(
     name="v",
     functions=("exp", "log", "sqrt", "tanh", "atan", "abs"),
     reserved=RESERVED,
-    units={"v": "m/s", "pi": "1", "mu_s": "1", "mu_k": "1"},
+    units={"v": "m/s", "pi": "1", "mu_s": "1", "mu_k": "1", DIRECTION.value: "1"},
     example="mu_k + (mu_s - mu_k)*exp(-v/v_s)",
 )
 
@@ -143,11 +152,14 @@ class Formula:
         Speeds at which its switches switch.
     units : dict of str to str
         Units of the parameters; ``""`` where the unit does not follow from the formula.
+    signed : bool
+        Whether it has the direction of sliding.
     """
 
     mu: Node
     thresholds: list[Threshold] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
+    signed: bool = False
 
 
 def read_formula(text: Any) -> Formula:
@@ -168,7 +180,8 @@ def read_formula(text: Any) -> Formula:
     mu = reader.visit(tree, ())
     units = Units()
     units.equal(units.visit(tree), _NONE, "the friction coefficient")
-    return Formula(mu, reader.thresholds, units.solved())
+    signed = any(isinstance(node, ast.Name) and node.id == DIRECTION.value for node in ast.walk(tree))
+    return Formula(mu, reader.thresholds, units.solved(), signed)
 
 
 def read_expression(text: str) -> Node:
@@ -336,8 +349,13 @@ class Reader:
                     return Threshold(b), less
                 if b is self.language.variable and not a.varies:
                     return Threshold(a), not less
+                # No speed is beyond an infinite one, and none is below a negative one.
+                if self.language.signed and {a, b} == {DIRECTION, expressions.ZERO}:
+                    return Threshold(expressions.multiply(number(math.inf), DIRECTION)), less is (a is expressions.ZERO)
         x = self.language.name
-        raise FormulaError(f"{_shown(condition)}: a condition compares {x} with a parameter, such as {x} < {x}1")
+        or_direction = ", or is direction > 0" * self.language.signed
+        problem = f"a condition compares {x} with a parameter, such as {x} < {x}1{or_direction}"
+        raise FormulaError(f"{_shown(condition)}: {problem}")
 
     def _named(self, name: str) -> Node:
         """Expression of a name: the variable, ``pi``, or a parameter."""

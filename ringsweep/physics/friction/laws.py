@@ -17,6 +17,7 @@ from ringsweep.physics.definitions import Definitions
 from ringsweep.physics.friction.formula import COEFFICIENTS, FormulaError, Threshold, read_expression, read_formula
 from ringsweep.physics.friction.registry import SetValued, Smooth, Traits, add_law, describe
 from ringsweep.physics.friction.velocity import EXPRESSIONS, MOST_PRODUCTS, PIECE, Expression, series_products
+from ringsweep.physics.friction.ways import SIGNED
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 
@@ -42,7 +43,7 @@ def _make(name: str, doc: str, expression: Expression, qualified: str | None = N
     if expression.has_edges:
         hidden.append("pieces" if expression.tabulated else "edges")
     if expression.thresholds:
-        hidden.append("thresholds")
+        hidden += ["thresholds", *["thresholds_back"] * expression.signed]
     if expression.has_band:
         hidden += ["band", "in_band"]
     fields: list[Any] = [(field, Annotated[Leaf, p]) for field, p in expression.parameters.items()]
@@ -302,10 +303,13 @@ def _law_by_formula(name: str, qualified: str, mu: str, at_rest: str | None) -> 
     parameters = {
         name: Parameter(unit, f"parameter {name} of the friction law") for name, unit in formula.units.items()
     }
-    expression = Expression(checked, (*formula.thresholds, *valid), at_rest is not None, None, parameters)
+    thresholds, signed = (*formula.thresholds, *valid), formula.signed
+    expression = Expression(checked, thresholds, at_rest is not None, None, parameters, signed=signed)
     if series_products(expression) > MOST_PRODUCTS:
         raise FormulaError(f"it is too long: more than {MOST_PRODUCTS} products of varying factors")
     law = _make(name, f"mu = {mu}" + (f", up to {at_rest} at rest" if at_rest else ""), expression, qualified=qualified)
+    if signed:
+        SIGNED.add(law)
     describe(law, Traits(SetValued if at_rest else Smooth, coefficients=_coefficients_among(used, at_rest)))
     return law
 

@@ -30,7 +30,7 @@ from ringsweep.numerics.isolation import (
     steepest,
 )
 from ringsweep.numerics.rows import distinct_rows, places_of
-from ringsweep.physics.friction.formula import FormulaError, Threshold
+from ringsweep.physics.friction.formula import DIRECTION, FormulaError, Threshold
 from ringsweep.physics.friction.velocity import Expression
 
 _Columns = dict[str, NDArray[np.float64]]
@@ -63,7 +63,8 @@ def hidden_fields(
     columns : mapping of str to ndarray of shape ``(cells,)``
         Parameters of the law.
     surfaces : sequence of tuple of ndarray of shape ``(cells,)``
-        ``(mu_s, mu_k)`` of each surface of the scene.
+        ``(mu_s, mu_k)`` of each surface of the scene. Under a formula with the direction of sliding, those of all
+        surfaces forwards stand before those backwards.
     speed : float or ndarray of shape ``(cells,)``
         Speed of the motion, m/s: what changes it by less than its rounding is negligible. 0 if it is not known.
 
@@ -71,8 +72,9 @@ def hidden_fields(
     -------
     dict of str to ndarray
         ``slope_at_rest`` and ``slope_beyond``, s/m. For laws with several regions ``edges``, their bounds in ascending
-        order, and ``thresholds``, the speeds of the switches; m/s. For laws with a stiction band ``band``, m/s, and
-        ``in_band``, the number of regions within it.
+        order, and ``thresholds``, the speeds of the switches; m/s. Under a formula with the direction these are the
+        speeds of forward sliding, and ``thresholds_back`` those of backward sliding. For laws with a stiction band
+        ``band``, m/s, and ``in_band``, the number of regions within it.
 
     Raises
     ------
@@ -177,6 +179,9 @@ class _Finder:
         self.values = {name: np.tile(column, len(surfaces)) for name, column in columns.items()}
         self.values["mu_s"], self.values["mu_k"] = (np.concatenate(column) for column in zip(*surfaces, strict=True))
         self.rows = len(self.values["mu_s"])
+        self.ways = 2 if expression.signed else 1
+        if expression.signed:
+            self.values[DIRECTION.value] = np.repeat([1.0, -1.0], self.rows // 2)
         self.rest = np.zeros(self.rows)
         self.thresholds: list[NDArray[np.float64]] = []
         self.found: dict[Any, Any] = {}
@@ -192,15 +197,16 @@ class _Finder:
         self._check_rest()
         self._check_jumps()
         found: dict[str, NDArray[Any]] = {}
-        edges = [self._one_of_each(speed) for speed in self.thresholds]
-        thresholds = edges.copy()
+        of_ways = [[self._by_way(speed)[way, 0] for speed in self.thresholds] for way in range(self.ways)]
+        edges = [speed for thresholds in of_ways for speed in thresholds]
         if self.expression.has_band:
             found["band"] = self._band()
             edges.append(found["band"])
         if self.expression.has_edges:
             found["edges"] = _sorted_edges(edges)
-            if thresholds:
-                found["thresholds"] = np.stack(thresholds, axis=1)
+            for name, thresholds in zip(("thresholds", "thresholds_back"), of_ways, strict=False):
+                if thresholds:
+                    found[name] = np.stack(thresholds, axis=1)
         if self.expression.has_band:
             found["in_band"] = (found["edges"] < found["band"][:, None]).sum(axis=1) + 1
         found["slope_at_rest"], found["slope_beyond"] = self._slopes(found.get("band"))
@@ -214,10 +220,13 @@ class _Finder:
         """Values as an array of shape ``(surfaces, cells)``."""
         return values.reshape(self.surfaces, -1)
 
-    def _one_of_each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Numbers that are the same for all surfaces, once."""
-        found: NDArray[np.float64] = self._by_surface(values)[0]
-        return found
+    def _by_way(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values as an array of shape ``(ways, surfaces, cells)``; the formula may be another one each way."""
+        return values.reshape(self.ways, self.surfaces // self.ways, -1)
+
+    def _on_all(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of shape ``(ways, cells)``, repeated for each surface."""
+        return np.repeat(values, self.surfaces // self.ways, axis=0).ravel()
 
     def _enclosed(self, node: Node) -> Enclosure:
         """Bounds on an expression over intervals of the speed."""
@@ -280,13 +289,13 @@ class _Finder:
 
     def _equal(self, speed: NDArray[np.float64]) -> NDArray[np.float64]:
         """Speeds that must not depend on the surface."""
-        found = self._by_surface(speed)
-        if not np.allclose(found, found[0], rtol=1e-12, atol=0.0):
+        found = self._by_way(speed)
+        if not np.allclose(found, found[:, :1], rtol=1e-12, atol=0.0):
             raise FormulaError(
                 "it switches at a speed that depends on mu_s or mu_k, which differ by zone or direction: "
                 "write the speed as a parameter of its own"
             )
-        return np.tile(found[0], self.surfaces)
+        return self._on_all(found[:, 0])
 
     def _signs(
         self, difference: Node, low: NDArray[np.float64], high: NDArray[np.float64]
@@ -324,8 +333,8 @@ class _Finder:
         return self._of_all(np.minimum(first, last), np.min), self._of_all(last, np.max)
 
     def _of_all(self, values: NDArray[np.float64], choose: Any) -> NDArray[np.float64]:
-        """One value for each cell, chosen among those on all its surfaces, and repeated for each surface."""
-        return np.tile(choose(self._by_surface(values), axis=0), self.surfaces)
+        """One value for each cell and way, chosen among those on all its surfaces, and repeated for each surface."""
+        return self._on_all(choose(self._by_way(values), axis=1))
 
     # ---- validity -----------------------------------------------------------------------------
 
@@ -341,9 +350,10 @@ class _Finder:
         changes = sign_changes(enclosure, self._cells(self.rest, np.full(self.rows, np.inf)), -_ROUNDING)
         speeds = refined(changes, enclosure, -_ROUNDING)
         sets = self.rows // self.surfaces
-        found = np.full((3, sets), np.inf)
-        for own in np.unique(changes.row % sets):
-            mine = changes.row % sets == own
+        found = np.full((3, self.ways * sets), np.inf)
+        of_set = changes.row % sets + changes.row // (self.rows // self.ways) * sets
+        for own in np.unique(of_set):
+            mine = of_set == own
             order = np.argsort(speeds[mine], kind="stable")
             # Number of surfaces on which friction is invalid.
             count = np.cumsum(-changes.after[mine][order].astype(int))
@@ -355,7 +365,7 @@ class _Finder:
                     "and from another speed on"
                 )
             found[: len(bounds), own] = bounds
-        return [np.tile(bound, self.surfaces) for bound in found]
+        return [self._on_all(bound.reshape(self.ways, sets)) for bound in found]
 
     def _check_rest(self) -> None:
         """Check values at rest, and that the law has a power series there."""
@@ -406,7 +416,7 @@ class _Finder:
     def _band(self) -> NDArray[np.float64]:
         """Speed up to which friction rises, m/s: the stiction band of a smooth law."""
         if self.expression.band is not None:
-            return self._one_of_each(self.at(self.expression.band, self.rest))
+            return self._by_surface(self.at(self.expression.band, self.rest))[0]
         cells = self._cells(self.rest, np.full(self.rows, np.inf))
         try:
             low, high, level = first_flat(self._enclosed(self.expression.mu), cells, _FLAT)
@@ -416,7 +426,7 @@ class _Finder:
         while ((low < (middle := 0.5 * (low + high))) & (middle < high)).any():
             flat = self.at(slope, middle) <= level
             low, high = np.where(flat, low, middle), np.where(flat, middle, high)
-        return self._one_of_each(self._of_all(high, np.max))
+        return self._by_surface(high).max(axis=0)
 
     def _slopes(self, band: NDArray[np.float64] | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Steepest slopes at rest and beyond the band, on the roughest surface."""

@@ -40,7 +40,7 @@ from ringsweep.numerics.functions import (
 from ringsweep.numerics.lanes import LANES
 from ringsweep.numerics.series import INVERSE
 from ringsweep.numerics.terms import MOST_GROUPS, PRODUCTS
-from ringsweep.physics.friction.formula import COEFFICIENTS, Threshold
+from ringsweep.physics.friction.formula import COEFFICIENTS, DIRECTION, Threshold
 from ringsweep.quantities.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
@@ -71,6 +71,8 @@ class Expression:
     tabulated : bool
         Whether the law is a table of cubics: the expression holds for each of them. The symbols ``piece 0`` to
         ``piece 4`` are the lower bound of a cubic, m/s, and its coefficients from the lowest power up.
+    signed : bool
+        Whether the formula has the direction of sliding. Then it stands behind the coefficients of the surfaces.
     """
 
     mu: Node
@@ -79,6 +81,7 @@ class Expression:
     band: Node | None
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     tabulated: bool = False
+    signed: bool = False
 
     @property
     def has_band(self) -> bool:
@@ -110,7 +113,7 @@ def _source_names(expression: Expression, surfaces: int) -> dict[str, str]:
         names |= {f"piece {j}": f"piece[{j}]" for j in range(PIECE)}
     for i in range(surfaces):
         names[f"{COEFFICIENTS[i % 2]} {i // 2}"] = f"surfaces[{i}]"
-    return names
+    return names | ({DIRECTION.value: f"surfaces[{surfaces - 1}]"} if expression.signed else {})
 
 
 #: Numbers of a cubic in a table.
@@ -171,8 +174,16 @@ _SCOPE = {
     "tanh_of": hyperbolic_tangent,
 }
 
-# In a region the condition for the lower side of a switch compares the lower bound of the region with its threshold.
-_REGION_SIDE, _SPEED_SIDE = "low < law.thresholds[{}]", "speed < law.thresholds[{}]"
+
+def _threshold(expression: Expression, count: int) -> str:
+    """Source text of a threshold; ``{0}`` stands for its index."""
+    ahead, back = "law.thresholds[{0}]", "law.thresholds_back[{0}]"
+    return f"select(surfaces[{count - 1}] > 0.0, {ahead}, {back})" if expression.signed else ahead
+
+
+def _side(expression: Expression, count: int, speed: str) -> str:
+    """Condition for the lower side of a switch. In a region `speed` is its lower bound, ``low``."""
+    return f"{speed} < {_threshold(expression, count)}"
 
 
 def _derived(write: Callable[..., list[str]]) -> Any:
@@ -282,7 +293,9 @@ def varies(expression, count, lanes, law, region):
     if expression.tabulated:
         # Beyond the table friction is constant.
         return [f"return {_interval(expression)} + 1 < law.pieces.shape[0]"]
-    return ["low = low_of(law, region)", *writer.varies_lines(expression.mu, _REGION_SIDE)]
+    if expression.signed:
+        return [f"return {expression.mu.varies}"]
+    return ["low = low_of(law, region)", *writer.varies_lines(expression.mu, _side(expression, count, "low"))]
 
 
 def is_varying(law: Any) -> bool:
@@ -318,8 +331,8 @@ def friction_at(expression, count, lanes, law, speed, surfaces):
     """
     names, outputs = _names_and_values(expression, count)
     if not lanes:
-        return [*_speed_prelude(expression), *writer.float_lines(names, outputs, _SPEED_SIDE)]
-    lines = [*_speed_prelude(expression), *writer.lanes_lines(names, outputs, "law.thresholds[{}]")]
+        return [*_speed_prelude(expression), *writer.float_lines(names, outputs, _side(expression, count, "speed"))]
+    lines = [*_speed_prelude(expression), *writer.lanes_lines(names, outputs, _threshold(expression, count))]
     if expression.has_band:
         return lines
     half = len(outputs) // 2
@@ -331,7 +344,8 @@ def friction_at(expression, count, lanes, law, speed, surfaces):
 @_derived
 def friction_in(expression, count, lanes, law, region, speed, surfaces):
     """What :func:`friction_at` returns, by the formula of a region, even if the speed lies outside the region."""
-    return [*_region_prelude(expression), *writer.float_lines(*_names_and_values(expression, count), _REGION_SIDE)]
+    side = _side(expression, count, "low")
+    return [*_region_prelude(expression), *writer.float_lines(*_names_and_values(expression, count), side)]
 
 
 @inlined
@@ -372,7 +386,8 @@ def passes_band(law, before, after, ahead):
 @_derived
 def leaps(expression, count, lanes, law, slow, fast):
     """Whether a whole bounded region lies between the speeds `slow` and `fast`, m/s: a step would jump over it."""
-    edges = 0 if expression.tabulated else len(expression.thresholds) + expression.has_band
+    thresholds = len(expression.thresholds) * (2 if expression.signed else 1)
+    edges = 0 if expression.tabulated else thresholds + expression.has_band
     within = [f"((slow < law.edges[{i}]) & (law.edges[{i + 1}] <= fast))" for i in range(edges - 1)]
     return ["return " + (" | ".join(within) or "slow > inf")]
 
@@ -383,7 +398,8 @@ def leaps(expression, count, lanes, law, slow, fast):
 @cache
 def _source_of_series(expression: Expression, count: int) -> writer.SeriesSource:
     """Source code of the power series of friction under each contact."""
-    return writer.series_source(_source_names(expression, count), _per_contact(expression, count), _REGION_SIDE)
+    names, side = _source_names(expression, count), _side(expression, count, "low")
+    return writer.series_source(names, _per_contact(expression, count), side)
 
 
 #: Largest number of products in the power series of a law: tables have places for that many besides those of a model.
@@ -392,7 +408,7 @@ MOST_PRODUCTS = MOST_GROUPS * PRODUCTS - 8
 
 def series_products(expression: Expression) -> int:
     """Number of products in the power series of friction at two contacts."""
-    return _source_of_series(expression, 4).products
+    return _source_of_series(expression, 5 if expression.signed else 4).products
 
 
 @_derived

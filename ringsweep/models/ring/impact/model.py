@@ -50,9 +50,9 @@ class SingleContactImpact(SingleContactRing):
 
     def build(self, structure: Structure, values: Values) -> Any:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
-        if structure.two_way:
-            path = f"scene.{structure.two_way[0]}"
-            raise InputError(path, "cannot depend on the direction beside impact: give one number, or leave impact out")
+        for path in structure.by_direction:
+            problem = "friction cannot depend on the direction of sliding beside impact: leave one of them out"
+            raise InputError(f"scene.{path}", problem)
         closed: Any = super().build(replace(structure, impact=False), values)
         balls = self.balls(values, closed.body)
         return ImpactRing(
