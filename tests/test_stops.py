@@ -104,6 +104,13 @@ class TestClosedForms:
         assert (found.impacts, found.x_end, found.velocity_end) == (1, 0.1, 0.0)
         assert found.regime.attrs["flag_meanings"].split()[int(found.regime)] == "sliding"
 
+    @pytest.mark.parametrize("e", [0.0, 0.3])
+    def test_a_body_that_an_impact_stops_on_a_belt_at_rest_sticks(self, e):
+        """Also soon after the impact."""
+        found = outcome(between(high=0.1, e=e, mu_k=0.1, stiffness=0.0, velocity=0.0, start=(0.0, 0.8), span=0.5))
+        assert found.regime.attrs["flag_meanings"].split()[int(found.regime)] == "sticking"
+        assert (found.stick_share, found.settled, found.certified) == (1.0, 1, 1)
+
     @pytest.mark.slow
     def test_a_body_leaves_a_stop_as_the_growing_load_lets_friction_win(self):
         """Friction mu (m g + A sin(w t)) exceeds the force that presses the body to the stop, from an instant on."""

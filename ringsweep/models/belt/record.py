@@ -372,6 +372,8 @@ def _stops(scene, r, now, stuck, place, sliding, force):
     pull = _if_located(scene.body.mass * rate + force, r.last.pull)
     passes = abs(pull) > (1.0 + 1e-9) * breakaway_force(scene, pull, r.last.x)
     passage = max(passage, select(passes, square_root(r.band * _pace(scene) / slowing), 0.0))
+    # An impact that stops the body, which takes no time, is no passage.
+    passage = select(now.duration > 0.0, passage, 0.0)
     start = select(anew, before, s.start)
     least = select(anew, min(_LONGEST_PASSAGE * _pace(scene), passage), s.least)
     slip_from = select(begins, nan, select(ends, r.last.place, s.slip_from))
