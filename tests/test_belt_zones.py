@@ -79,6 +79,16 @@ def test_the_millionth_period_of_a_belt_is_as_exact_as_the_first():
     assert run.x_end.item() - start == pytest.approx(stop, abs=4.0 * np.spacing(start))
 
 
+def test_bounds_tell_how_narrow_patches_far_away_magnify_the_rounding_of_their_edges():
+    start, period, width, mu, speeds = 500.0, 1e-3, 1e-9, 100.0, np.linspace(0.6, 1.2, 8)
+    scene = with_zones([(0.5 * period, 0.5 * width, mu, mu)], (0.0, 0.0), period=period, start=(start, 1.0), span=1.0)
+    run = ringsweep.sweep(scene, {"initial.velocity": speeds}, progress=False)
+    patches = np.floor((run.x_end.values - start) / period + 0.5)
+    left = np.sqrt(speeds**2 - 2.0 * mu * G * width * patches)
+    assert (abs(run.velocity_end.values - left) <= run.velocity_end_error.values).all()
+    assert run.certified.all()
+
+
 def test_a_large_ring_near_its_bottom_is_a_belt():
     radius = 1e7
     friction = {"law": "stiction", "rough": {"mu_s": 0.5, "mu_k": 0.4}, "elsewhere": {"mu_s": 0.2, "mu_k": 0.1}}

@@ -19,6 +19,7 @@ from ringsweep.models.slip import acceleration_slopes, slip
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt, laden
 from ringsweep.physics.forces import force_in
+from ringsweep.physics.zones import Segments
 from ringsweep.quantities.flags import OSCILLATORY, SEPARATING
 
 # An oscillation is certain if the two runs of a cell differ by less than this share of its swing.
@@ -45,6 +46,16 @@ def _least_scales_on_belt(batch):
     with np.errstate(divide="ignore", over="ignore"):
         swing = np.sqrt(batch.body.mass / np.abs(batch.body.stiffness))
     return {"s": np.minimum(swing, batch.span), "m s-1": np.abs(batch.initial_v)}
+
+
+@audit.disturbed.implements(Belt)
+def _disturbed_zones(batch):
+    """Implement :func:`audit.disturbed`: edges of zones on the belt are rounded otherwise, which narrow ones magnify."""
+    if not isinstance(batch.surface, Segments):
+        return batch
+    ruler = batch.surface.ruler
+    ruler = ruler._replace(period=np.nextafter(ruler.period, np.inf))
+    return batch._replace(surface=batch.surface._replace(ruler=ruler))
 
 
 @audit.violation.implements(Belt)
