@@ -50,7 +50,7 @@ def _least_scales_on_belt(batch):
 
 @audit.disturbed.implements(Belt)
 def _disturbed_zones(batch):
-    """Implement :func:`audit.disturbed`: edges of zones on the belt are rounded otherwise, which narrow ones magnify."""
+    """Implement :func:`audit.disturbed`: edges of zones on the belt are rounded otherwise; narrow ones magnify it."""
     if not isinstance(batch.surface, Segments):
         return batch
     ruler = batch.surface.ruler
