@@ -212,7 +212,7 @@ def test_a_formula_may_end_in_one_direction_only():
     [
         ({"law": "stiction", "mu_s": {"forward": 0.3}, "mu_k": 0.1}, "scene.friction.mu_s.backward: missing"),
         ({"law": "stiction", "mu_s": {"up": 0.3}, "mu_k": 0.1}, "scene.friction.mu_s.up: unknown key"),
-        (two_way((0.3, 0.2), (0.1, 0.2)), "scene.friction.mu_k: 0.2 exceeds mu_s"),
+        (two_way((0.3, 0.2), (0.1, 0.2)), "scene.friction.mu_k.backward: 0.2 exceeds mu_s"),
         (
             {"law": "bristle", "mu_k": {"forward": 0.3, "backward": 0.2}, "sigma0": 1e4},
             "scene.friction.mu_k: not available with law bristle",

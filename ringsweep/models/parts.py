@@ -71,9 +71,9 @@ def friction_coefficients(
         # At rest friction holds up to its value there. A smooth law vanishes there: its greatest value counts.
         return scale * (mu[0] or mu.max()), scale
     mu_s, mu_k = (values[f"{place}.{name if name in names else next(iter(names))}"] for name in ("mu_s", "mu_k"))
-    require(
-        mu_s >= mu_k, f"{place}.mu_k", mu_k, "{} exceeds mu_s: kinetic friction cannot be greater than static friction"
-    )
+    where, problem = f"{place}.mu_k", "{} exceeds mu_s: kinetic friction cannot be greater than static friction"
+    where = next((path for way in WAYS if values.get(path := f"{where}.{way}") is mu_k), where)
+    require(mu_s >= mu_k, where, mu_k, problem)
     return mu_s, mu_k
 
 
