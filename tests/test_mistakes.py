@@ -56,7 +56,7 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"of": {"body.mass": {"uniform": "10 %"}}}, "sweep.sample.of.body.mass.uniform", "or 0.1 ± 10 % is expected"),
     ({"of": {"body.mass": {"uniform": "0 ± 10 %"}}}, "sweep.sample.of.body.mass.uniform", "give the tolerance itself"),
     ({"keep": 1}, "sweep.sample.keep", "true or false"),
-    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true or false is expected, got 'yes'"),
+    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "a section with keys is expected, got 'yes'"),
     ({"of": {}}, "sweep.sample.of", "paths and distributions"),
     *(
         ({"of": {"body.mass": {kind: numbers}}}, "sweep.sample.of.body.mass", f"draws {wrong} kg, but mass of the body")
@@ -105,6 +105,10 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
         "scene.friction.mu_k",
         "not all points of the sample are allowed",
     ),
+    ({"sensitivity": {"off": ["x_end"]}}, "sweep.sample.sensitivity.off", "did you mean `of`"),
+    ({"sensitivity": {"of": "x_end"}}, "sweep.sample.sensitivity.of", "a list of variables is expected, got 'x_end'"),
+    ({"sensitivity": {"of": ["x_ned"]}}, "sweep.sample.sensitivity.of.0", "did you mean `x_end`"),
+    ({"sensitivity": {"of": ["first_slip"]}}, "sweep.sample.sensitivity.of.0", "by survival: [1 s]"),
 ]
 
 # Path, interval, further arguments, and the start of the line.

@@ -215,6 +215,7 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
         "of": _open(drawn, _section(kinds), propertyNames=names, minProperties=1),
         "quantiles": {"type": "object", "additionalProperties": _list(_VALUE)},
         "survival": axis,
+        "sensitivity": {"anyOf": [_FLAG, _section({"of": _list(_TEXT)}, "of")]},
     }
     found = _section(_keys(uncertain.KEYS, **others), *("n", "of"))
     return {"description": "uncertain parameters: each cell of the grid is sampled", **found}

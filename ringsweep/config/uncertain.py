@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config.axes import Axes, check_consistency, paths_of, read_spacing, swept_parameter
 from ringsweep.config.scene import outcome_numbers, sweepable
-from ringsweep.config.sections import Key, Keys, check_keys, read_keys, read_values, suggestion
+from ringsweep.config.sections import Key, Keys, check_keys, one_of, read_keys, read_values, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
@@ -33,7 +33,7 @@ KEYS: Keys = {
     "of": Key("distributions by path", example="{body.mass: {normal: [76 g, 1 %]}}"),
     "quantiles": Key("variable -> levels"),
     "survival": Key("times at which it is asked whether the contacts still hold"),
-    "sensitivity": Key("whether Sobol indices of the regimes are asked for", default=False),
+    "sensitivity": Key("Sobol indices, and of which variables beside the regimes"),
     "keep": Key("whether the result holds the runs too", default=False),
 }
 
@@ -41,6 +41,9 @@ KEYS: Keys = {
 _TOLERANCE = re.compile(r"\s*(.+?)\s*(?:±|\+/?-)\s*(.+?)\s*")
 
 _LEVEL = Parameter("1", "level of a quantile", lower=0, upper=1, open_lower=True, open_upper=True)
+
+#: Numbers that tell when something happens, and that are missing where it does not.
+CENSORED = ("t_separation", "first_slip")
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,9 @@ class Sample:
         Times at which it is asked whether the contacts still hold, s.
     sensitivity : bool
         Whether Sobol indices are asked for.
+    sensitive : tuple of str
+        Variables whose own indices are asked for, beside those of the regimes; for a time that some runs do not have,
+        those of whether it has come at the times of `survival`.
     keep : bool
         Whether the result holds the runs too.
     """
@@ -115,6 +121,7 @@ class Sample:
     quantiles: Mapping[str, tuple[float, ...]]
     survival: tuple[float, ...]
     sensitivity: bool
+    sensitive: tuple[str, ...]
     keep: bool
 
     @property
@@ -165,7 +172,7 @@ def _shares(method: str, size: int, factors: int, seed: int, replicates: int, se
 
 def censored(scene: Scene) -> str:
     """The number that tells when a contact is lost, or when a body that rides on its belt first slips."""
-    return next(name for name in ("t_separation", "first_slip") if name in MODELS[scene.structure.model].outcomes)
+    return next(name for name in CENSORED if name in MODELS[scene.structure.model].outcomes)
 
 
 def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
@@ -181,13 +188,15 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     where = "sweep.sample"
     section = read_keys(given, KEYS, where)
     _check_number(section["method"], section["n"], section["replicates"])
+    sensitivity, sensitive = _sensitivity(section["sensitivity"], scene, bool(section["survival"]))
     time = Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
     own = {
         "factors": _factors(section.pop("of"), scene, axes),
         "quantiles": _quantiles(section["quantiles"], scene),
         "survival": () if (asked := section["survival"]) is None else _ascending(asked, time, f"{where}.survival"),
+        "sensitivity": sensitivity,
     }
-    found = Sample(**section | own)
+    found = Sample(**section | own, sensitive=sensitive)
     cells = math.prod(axes.sizes.values())
     for path, total in (("", cells * found.replicates), (".keep", cells * found.n * found.rows * found.keep)):
         if total > MAX_CELLS:
@@ -334,6 +343,24 @@ def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
         raise InputError(where, f"variables with lists of levels are expected, got {show(given)}")
     check_keys(given, outcome_numbers(scene), where, "is no number of this model")
     return {name: _ascending(levels, _LEVEL, f"{where}.{name}") for name, levels in given.items()}
+
+
+def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str, ...]]:
+    """Whether Sobol indices are asked for, and of which variables beside the regimes."""
+    if given is None or isinstance(given, bool):
+        return bool(given), ()
+    where = "sweep.sample.sensitivity"
+    of = read_keys(given, {"of": Key("variables", example="[t_end]")}, where)["of"]
+    if not isinstance(of, list) or not of:
+        raise InputError(f"{where}.of", f"a list of variables is expected, got {show(of)}")
+    time = censored(scene)
+    names = [name for name in outcome_numbers(scene) if name not in CENSORED or name == time]
+    for k, name in enumerate(of):
+        if name == time and not timed:
+            problem = f"{time} is missing in runs in which it does not happen: say at which times, by survival: [1 s]"
+            raise InputError(f"{where}.of.{k}", problem)
+        one_of(name, names, f"{where}.of.{k}", "is no number of this model")
+    return True, tuple(dict.fromkeys(of))
 
 
 def _ascending(given: Any, parameter: Parameter, where: str) -> tuple[float, ...]:

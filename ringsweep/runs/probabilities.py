@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config, Setting, load, sweepable
 from ringsweep.config.axes import dimension
-from ringsweep.config.uncertain import Sample, censored
+from ringsweep.config.uncertain import CENSORED, Sample, censored
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.flags import FAILED, REGIMES
@@ -51,7 +51,7 @@ def compute_parts(config: Config, layout: Layout, positions: NDArray[np.integer]
     of_runs = Layout((*layout.sizes[:-1], each), (*layout.chunk[:-1], each))
     numbers = (positions[:, None] * runs + np.arange(runs)).ravel()
     times = [censored(config.scene)] if sample.survival else []
-    needed = list(dict.fromkeys(["regime", "certified", *times, *sample.quantiles]))
+    needed = list(dict.fromkeys(["regime", "certified", *times, *sample.quantiles, *sample.sensitive]))
     found, seconds = [], []
     for start in range(0, len(numbers), CHUNK):
         result = compute_task(one, of_runs, numbers[start : start + CHUNK])
@@ -85,6 +85,12 @@ def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
         found[f"{name}_values"] = np.where(sure, happened, np.nan)
     if sample.sensitivity:
         found["sobol_sums"] = sobol_sums(1.0 * (rows["regime"][:, None] == words[:, None, None]))
+        for name in sample.sensitive:
+            values = rows[name]
+            if name in CENSORED:
+                # A time that has not come is not a number, and compares as later.
+                values = 1.0 * (values[:, None] <= np.array(sample.survival)[:, None, None])
+            found[f"{name}_sobol_sums"] = sobol_sums(values)
     return found
 
 
@@ -109,8 +115,9 @@ class Sampled(Grid):
         """Size of the sums of a cell, and of its runs if they are kept."""
         sample = self.asked
         events, own = len(REGIMES) + len(sample.survival), sample.size * len(sample.own)
+        indices = len(REGIMES) + len(sample.sensitive) * max(len(sample.survival), 1)
         numbers = 2 * events + own * len(sample.quantiles)
-        numbers += 3 * (len(sample.factors) + 1) * len(REGIMES) * sample.sensitivity
+        numbers += 3 * (len(sample.factors) + 1) * indices * sample.sensitivity
         return int(8 * numbers + sample.keep * sample.size * sample.rows * _RUN_BYTES) * int(sample.replicates)
 
     def task(self) -> Callable[[NDArray[np.integer]], TaskResult]:
@@ -144,7 +151,14 @@ class Sampled(Grid):
                 about = f"{of}: {known[name].long_name}"
                 found[f"{name}_quantile{end}"] = Variable(known[name].unit, about, dims=("quantile",))
         if sample.sensitivity:
-            found |= _beginning_with("sobol_", ("word", "parameter"))
+            measures = _beginning_with("sobol_", ("word", "parameter"))
+            found |= measures
+            for number in sample.sensitive:
+                about = known[number].long_name
+                times = ("survival_time",) if number in CENSORED else ()
+                for name, one in measures.items():
+                    text = one.long_name.replace("the indicator of each regime", about)
+                    found[f"{number}_{name}"] = Variable("1", text, dims=(*times, "parameter"))
         if sample.keep:
             found = {name: replace(one, dims=("replicate", "sample")) for name, one in known.items()} | found
         return found
@@ -215,10 +229,10 @@ class Sampled(Grid):
             each = [quantiles(values[cell], levels, sample.independent) for cell in np.ndindex(values.shape[:-2])]
             in_cells = np.reshape(each, (*values.shape[:-2], 3, len(levels)))
             found |= {f"{name}_quantile{end}": in_cells[..., k, :] for k, end in enumerate(QUANTILE_ENDS)}
-        if sample.sensitivity:
-            together = np.moveaxis(sums["sobol_sums"], of_parts, -2)
+        for prefix in ("", *(f"{name}_" for name in sample.sensitive)) if sample.sensitivity else ():
+            together = np.moveaxis(sums[f"{prefix}sobol_sums"], of_parts, -2)
             for name, index in zip(("sobol_first", "sobol_total"), sobol_indices(together, sample.size), strict=True):
-                found |= {f"{name}{end}": part for end, part in zip(QUANTILE_ENDS, index, strict=True)}
+                found |= {f"{prefix}{name}{end}": part for end, part in zip(QUANTILE_ENDS, index, strict=True)}
         return found | {name: column for name, column in sums.items() if name in OUTCOMES}
 
 

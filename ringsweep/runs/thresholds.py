@@ -200,7 +200,7 @@ def distribution(
         If the sweep has other axes, or a number of the sample is a ratio to the one that varies.
     """
     assert config.sample is not None
-    sample = replace(config.sample, sensitivity=False, keep=False, quantiles={}, survival=())
+    sample = replace(config.sample, sensitivity=False, sensitive=(), keep=False, quantiles={}, survival=())
     if others := [name for name in config.axes.columns if name != path]:
         raise InputError("sweep", f"also varies {', '.join(others)}, but a threshold is that of one cell: leave it out")
     for factor in sample.factors:
