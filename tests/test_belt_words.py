@@ -300,3 +300,17 @@ class TestSteadySliding:
 
 def words_of(found):
     return ringsweep.words(found.regime).values
+
+
+@pytest.mark.slow
+def test_rounding_never_makes_a_cycle_of_less_than_one():
+    """At its greatest displacement the velocity may change its sign twice, by rounding."""
+    body, spring = {"mass": 0.669988738335861, "normal_stiffness": 0.255742034069238}, 1.4693504666457644
+    friction = {"law": "stiction", "mu_s": 0.18089926280769536, "mu_k": 0.10697760337822579}
+    start = 0.25994065960544027 * (1.0 + 1e-13 * np.random.default_rng(1).standard_normal(300))
+    of = on_belt(friction, spring, gravity=8.650839141651959, start=(0.0, 0.0), span=3.5798752769840103) | {
+        "body": body, "drive": {"law": "constant", "amplitude": 0.35822866047986557},
+        "force": {"constant": -3.3880418085353217},
+    }  # fmt: skip
+    found = ringsweep.sweep(of, {"initial.velocity": xr.DataArray(start, dims="case")}, progress=False)
+    assert set(words(found)) == {"sliding"}

@@ -417,8 +417,9 @@ def _cycles(scene, r, stops, now, v, turn, span):
     # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
     # in stick disturbs this turn.
     backward = v > now.velocity
-    far = high - low > _least_turn(r, span)
-    turns = far & select(backward, turn.is_greatest, turn.is_least) & (period == inf)
+    # At the other turn rounding may let the velocity change its sign twice: the body has not moved since then.
+    moved = select(backward, turn.x - low, high - turn.x)
+    turns = (moved > _least_turn(r, span)) & select(backward, turn.is_greatest, turn.is_least) & (period == inf)
     old = _with_extremes(c, low, high)
     count = select(due, cycles.number_at(c, period, now.t), c.count + select(turns, 1.0, 0.0))
     ended = due | turns
