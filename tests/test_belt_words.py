@@ -314,3 +314,18 @@ def test_rounding_never_makes_a_cycle_of_less_than_one():
     }  # fmt: skip
     found = ringsweep.sweep(of, {"initial.velocity": xr.DataArray(start, dims="case")}, progress=False)
     assert set(words(found)) == {"sliding"}
+
+
+@pytest.mark.slow
+def test_body_that_creeps_on_a_vibrating_belt_has_the_period_of_the_belt():
+    """Its creep decides by rounding, otherwise in the mirror image, whether its states return."""
+    mu = 0.1981514541993127
+    law = {"mu_s": mu, "mu_k": mu, "alpha": 4.2553050639334655, "v0": 1.4168732722499053e-05}
+    of = scene("bengisu-akay", k=7.750528083630341, drive=(1.0, 1.8576954655811841), span=6.922351069132515, **law)
+    of |= {"body": {"mass": 0.8611921598818996}, "drive": of["drive"] | {"phase": 0.12382374096225914}}
+    numbers = {"drive.amplitude": -0.010128983327254756, "initial.x": -0.0867180405246526}
+    numbers |= {"initial.velocity": 0.64417358309192}
+    both = {path: xr.DataArray([number, -number], dims="image") for path, number in numbers.items()}
+    found = ringsweep.sweep(of, both, progress=False)
+    assert words(found) == ["sticking", "sticking"]
+    np.testing.assert_allclose(found.period, 1.0 / of["drive"]["frequency"], rtol=1e-14)

@@ -574,7 +574,9 @@ def _words(scene, r, t, of):
         return SLIDING, still, nan, 0.0, 0.0
     if in_stop and (for_good or stops.least < 0.0):
         motion = RIDING if stops.least < 0.0 else STICKING
-        return motion, held if for_good else TRANSIENT, c.period if for_good and repeats else nan, 1.0, 0.0
+        # Whether states of a slow creep return within their tolerance does not matter.
+        period = scene.forcing_period if for_good and repeats else nan
+        return motion, held if for_good else TRANSIENT, period, 1.0, 0.0
     natural = 2.0 * pi / sqrt(scene.body.stiffness / scene.body.mass) if scene.body.stiffness > 0.0 else inf
     slips_since = t - stops.slip_start
     if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
