@@ -80,6 +80,13 @@ def test_setting_one_way_of_a_number_leaves_the_other_way_as_it_is():
     assert run.x_end.item() == ringsweep.simulate(conveyor(pair)).x_end.item()
 
 
+def test_an_axis_over_one_way_of_a_number_leaves_the_other_way_as_it_is():
+    number, pair = ({"law": "stiction", "mu_s": mu_s, "mu_k": 0.2} for mu_s in (0.3, {"backward": 0.3}))
+    axis = {"friction.mu_s.forward": [0.4, 0.5]}
+    runs = [ringsweep.sweep(conveyor(friction), axis, progress=False)[[*NAMES]] for friction in (number, pair)]
+    xr.testing.assert_identical(*(run.drop_attrs() for run in runs))
+
+
 @pytest.mark.slow
 def test_two_equal_numbers_are_one_number_in_a_zone_of_a_ring():
     rough, found = ({"mu_s": 0.4, "mu_k": 0.3}, {"mu_s": 0.4, "mu_k": {"forward": 0.3, "backward": 0.3}}), []

@@ -179,16 +179,25 @@ def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
 
 
 def _two_way(scene: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
-    """Paths of the friction coefficients that the scene or the sweep gives for both directions of sliding."""
-    split = *_sections(scene), *(path.rpartition(".")[0] for path in map(str, swept) if path.endswith(_ENDS))
-    return tuple(path for path in dict.fromkeys(split) if path.rpartition(".")[2] in SURFACE)
+    """Paths of the friction coefficients that the scene or the sweep gives for both directions of sliding.
+
+    A number of which the sweep varies one direction becomes two, as ``--set`` makes them.
+    """
+    sections = dict(_sections(scene))
+    split = *sections, *(path.rpartition(".")[0] for path in map(str, swept) if path.endswith(_ENDS))
+    found = tuple(path for path in dict.fromkeys(split) if path.rpartition(".")[2] in SURFACE)
+    for path in found:
+        place, _, name = path.rpartition(".")
+        if path not in sections and name in (section := sections.get(place, {})):
+            section[name] = dict.fromkeys(WAYS, section[name])
+    return found
 
 
-def _sections(node: Any, prefix: str = "") -> Iterator[str]:
-    """Paths of all sections below a path that ends with a dot."""
+def _sections(node: Any, prefix: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Paths of all sections below a path that ends with a dot, and the sections."""
     for key, child in node.items() if isinstance(node, dict) else enumerate(node):
         if isinstance(child, dict):
-            yield f"{prefix}{key}"
+            yield f"{prefix}{key}", child
         if isinstance(child, dict | list):
             yield from _sections(child, f"{prefix}{key}.")
 
