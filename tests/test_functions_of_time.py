@@ -201,7 +201,7 @@ class TestVelocity:
         [
             ({"velocity": "V*sin(t*t/T/T)", "V": 1, "T": 1}, "drive.velocity: .*its integral is not known: known"),
             ({"velocity": "V*log(1 + t/T)", "V": 1, "T": 1}, "drive.velocity: .*; give theta"),
-            ({"velocity": "V*sign(sin(w*t))", "V": 1, "w": 1}, "drive.velocity: .*its integral is not known"),
+            ({"velocity": "V*sign(sin(w*t))", "V": 1, "w": 1}, "drive.velocity: .*not known.* a triangle wave"),
             ({"velocity": "velocity*sin(w*t)", "w": 1}, "drive.velocity: is the formula: give its parameter another"),
             ({"velocity": "V*sin(w*t)", "theta": "A*sin(w*t)", "A": 1, "V": 1, "w": 1}, "cannot stand beside theta"),
             ({"velocity": "V*sin(w*t)", "V": "1 rad", "w": 1}, "drive.V: .*wrong unit: .* is in rad/s"),
@@ -269,6 +269,7 @@ class TestSwitches:
             (by("A*(t/T - floor(t/T))", A=2.0, T=0.9), "the angle jumps from 2 rad to 0 rad at t = 0.9 s"),
             (by("A*max(sin(w*t), t/T)", A=2.0, w=5e4, T=9.0), "the times of its switches are not found: within"),
             (by("A*floor(2*sin(w*t))", A=2.0, w=1.0), "floor takes a straight line in t, such as floor(t/T)"),
+            (by("A*floor(sin(t))", A=2.0), "floor takes a straight line in t, such as floor(t/T)"),
             (by("A*t*floor(A/A)", A=2.0), "floor of an expression without t: write the number itself"),
             (by("A*t**1.5", A=2.0), "its first derivative is no finite number at t = 0 s"),
             (by("A*log(t/T)", A=2.0, T=1.0), "the formula is no finite number at t = 0 s"),

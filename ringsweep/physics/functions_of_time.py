@@ -116,6 +116,8 @@ class _Reader(Reader):
         if not inner.varies:
             raise FormulaError(f"{name} of an expression without t: write the number itself")
         if name == "floor":
+            if not _is_line(inner):
+                raise FormulaError("floor takes a straight line in t, such as floor(t/T)")
             return expressions.held(self._index(Threshold(None, inner, kind="floor")))
         one = inner if name == "abs" else ONE
         return self._first_where_negative(inner, negative(one), one, within)
@@ -178,7 +180,8 @@ def read_rate(text: Any, unit: str) -> Function:
     except ValueError:
         raise FormulaError(
             "its integral is not known: known are polynomials, exp, sin, cos, tanh and atan of straight lines in t, "
-            "products of a polynomial and one exp, sin or cos, and sums and piecewise(t < t1, ...) of these; give theta"
+            "products of a polynomial and one exp, sin or cos, and sums and piecewise(t < t1, ...) of these; give "
+            "theta; the place of a square wave is a triangle wave, such as theta: V*T*abs(t/T - floor(t/T + 1/2))"
         ) from None
     return replace(rate, value=value, rate=rate.value, unit=unit.removesuffix("/s"), by_rate=True)
 
@@ -228,21 +231,23 @@ def _widened(knots: NDArray[np.float64], width: int) -> NDArray[np.float64]:
     return np.pad(knots, [*[(0, 0)] * (knots.ndim - 1), (0, width - knots.shape[-1])], mode="edge")
 
 
-def _line(difference: Node, values: Values) -> tuple[Any, Any] | None:
-    """Value at t = 0 and slope of a straight line in t; None of another expression."""
-    rate = derivative(difference)
-    if rate.varies or any(node.kind in ("switch", "held") for node in nodes_of(difference)):
-        return None
+def _is_line(difference: Node) -> bool:
+    """Whether an expression is a straight line in t."""
+    return not derivative(difference).varies and all(
+        node.kind not in ("switch", "held") for node in nodes_of(difference)
+    )
+
+
+def _line(difference: Node, values: Values) -> tuple[Any, Any]:
+    """Value at t = 0 and slope of a straight line in t."""
     cells = len(values["knots"])
-    start, slope = (np.broadcast_to(evaluate(node, 0.0, values), cells) for node in (difference, rate))
+    start, slope = (np.broadcast_to(evaluate(n, 0.0, values), cells) for n in (difference, derivative(difference)))
     return start, slope
 
 
 def _of_floor(inner: Node, values: Values, spans: NDArray[np.float64]) -> NDArray[np.float64]:
     """Knots of a whole part."""
-    if (line := _line(inner, values)) is None:
-        raise FormulaError("floor takes a straight line in t, such as floor(t/T)")
-    start, slope = line
+    start, slope = _line(inner, values)
     # The line passes a whole number once in each turn.
     first = np.where(slope > 0.0, np.ceil(start), np.floor(start) - (slope < 0.0))
     shares = np.where(slope == 0.0, -inf, np.where(slope > 0.0, -start, start) % 1.0 % 1.0)
@@ -257,8 +262,8 @@ def _side(is_above: Any) -> Any:
 def _of_switch(difference: Node, values: Values, spans: NDArray[np.float64]) -> NDArray[np.float64]:
     """Knots of a switch, which are where a difference changes its sign."""
     zero = np.zeros(len(spans))
-    if (line := _line(difference, values)) is not None:
-        start, slope = line
+    if _is_line(difference):
+        start, slope = _line(difference, values)
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.where(slope == 0.0, inf, -start / slope)
         before = np.where(slope == 0.0, start >= 0.0, slope < 0.0)
