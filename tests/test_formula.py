@@ -231,6 +231,10 @@ class TestUnits:
     def test_units_of_parameters_follow_from_the_formula(self, text, units):
         assert read_formula(text).units == units
 
+    def test_a_condition_is_one_where_it_holds_and_else_zero(self):
+        factor, written = (read_formula(f"mu_k*{text}*v/w") for text in ("(v < w)", "piecewise(v < w, 1, 0)"))
+        assert factor == written
+
     def test_parameter_in_its_unit_or_in_another_of_its_kind_is_converted(self):
         for delta in ("3 s/m", 3, "0.003 s/mm"):
             values = load({"scene": belt(LEINE | {"delta": delta})}).scene.values

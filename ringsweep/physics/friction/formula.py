@@ -257,6 +257,9 @@ class Reader:
                 return expressions.negative(self.visit(inner, within))
             case ast.BinOp(left=left, op=operation, right=right) if type(operation) in _OPERATIONS:
                 return _OPERATIONS[type(operation)](self.visit(left, within), self.visit(right, within))
+            case ast.Compare():
+                # A condition is 1 where it holds, else 0.
+                return self._piecewise(ast.Call(ast.Name("piecewise"), [tree, *map(ast.Constant, (1, 0))], []), within)
             case ast.Call(func=ast.Name(id=name), keywords=[]):
                 return self._call(tree, name, within)
         raise FormulaError(f"{_shown(tree)} is not understood (allowed: {self.language.grammar})")
@@ -423,8 +426,11 @@ class Units:
                 return _times(self.visit(left), self.visit(right), 1 if isinstance(operation, ast.Mult) else -1)
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
                 return self._power(left, right)
-            case ast.BinOp(left=left, right=right) | ast.Compare(left=left, comparators=[right]):
+            case ast.BinOp(left=left, right=right):
                 return self._alike([left, right], tree)
+            case ast.Compare(left=left, comparators=[right]):
+                self._alike([left, right], tree)
+                return _NONE
             case ast.Call(func=ast.Name(id="piecewise"), args=[*arguments]):
                 for condition in arguments[:-1:2]:
                     self.visit(condition)
