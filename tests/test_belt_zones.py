@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 import xarray as xr
-from belts import on_belt, outcome
+from belts import on_belt, outcome, with_exponent
 from refusals import refused
+from scipy.integrate import solve_ivp
+from solutions import period_map
 from test_functions_of_time import cells_of
+from tiers import mostly_slow
 
 import ringsweep
 
@@ -20,6 +23,73 @@ def with_zones(zones, elsewhere, frame="belt", period=1.0, law="stiction", **res
     if frame == "belt":
         scene["belt"]["period"] = period
     return scene
+
+
+def on_bristles(law, frame, zones=((0.1, 0.12, 0.25, 0.2), (-0.2, 0.05, 0.5, 0.4)), elsewhere=(0.4, 0.3), **rest):
+    """Body with bristles on a belt with zones, whose kernel all tests of a law and a frame share."""
+    scene = with_zones(zones, elsewhere, frame, law=law, **({"stiffness": 8.0, "force": (3.0, 0.4)} | rest))
+    of_law = {"sigma0": 1000.0} | ({} if law in ("dahl", "bristle") else {"sigma1": 5.0})
+    scene["friction"] |= of_law | ({"sigma2": 0.2, "v_s": 0.05} if law in ("lugre", "elasto-plastic") else {})
+    if law in ("dahl", "bristle"):
+        for place in (scene["friction"]["elsewhere"], *scene["zones"]):
+            del place["mu_s"]
+    return scene
+
+
+def by_scipy_on_bristles(scene):
+    """Displacement and velocity at the end of a motion on LuGre or Dahl bristles, by SciPy from edge to edge."""
+    own, velocity = scene["friction"], scene["belt"]["velocity"]
+    period = scene["belt"].get("period", 1e3)
+    shift = velocity if own["frame"] == "belt" else 0.0
+    s0, s1, s2 = (own.get(f"sigma{i}", 0.0) / G for i in range(3))
+    edges = np.sort(
+        [zone["center"] + side * zone["half_length"] + n * period for zone in scene["zones"] for side in (-1, 1)
+         for n in range(-9, 10)]
+    )  # fmt: skip
+
+    def under(place):
+        found = own["elsewhere"]
+        for zone in scene["zones"]:
+            found = (
+                zone
+                if abs((place - zone["center"] + period / 2) % period - period / 2) < zone["half_length"]
+                else found
+            )
+        return found.get("mu_s", found["mu_k"]), found["mu_k"]
+
+    t, span, y = (
+        0.0,
+        scene["time"]["span"],
+        np.array([scene["initial"]["x"], scene["initial"]["velocity"] - velocity, 0.0]),
+    )
+    segment = np.searchsorted(edges, y[0])
+    while t < span:
+        low, high = edges[segment - 1], edges[segment]
+        mu_s, mu_k = under(0.5 * (low + high))
+
+        def rates(t, y, mu_s=mu_s, mu_k=mu_k):
+            x, v, z = y
+            g = mu_k + (mu_s - mu_k) * np.exp(-((v / own["v_s"]) ** 2)) if "v_s" in own else mu_k
+            rate = v - s0 * abs(v) * z / g
+            force = scene["force"]["amplitude"] * np.sin(2.0 * np.pi * scene["force"]["frequency"] * t)
+            pull = force - scene["spring"]["stiffness"] * x - G * (s0 * z + s1 * rate + s2 * v)
+            return v + velocity, pull, rate
+
+        def above(t, y, high=high):
+            return high - y[0] + shift * t
+
+        def below(t, y, low=low):
+            return y[0] - shift * t - low
+
+        above.terminal, above.direction, below.terminal, below.direction = True, -1, True, -1
+        part = solve_ivp(rates, (t, span), y, "DOP853", rtol=1e-12, atol=1e-13, max_step=0.02, events=(above, below))
+        t, y = part.t[-1], part.y[:, -1]
+        if part.status == 1:
+            side = 1 if len(part.t_events[0]) else -1
+            segment += side
+            # Exactly on the edge: the next part does not cross it again.
+            y[0] = (high if side > 0 else low) + shift * t
+    return y[0], y[1] + velocity
 
 
 def where_it_stops(energy, low, high, period, rough, rest):
@@ -45,17 +115,67 @@ def test_friction_over_patches_takes_the_energy_of_the_launch(frame, period):
     assert run.x_end.values[-1] == pytest.approx(-behind, rel=1e-12)
 
 
-def test_a_patch_of_the_whole_period_is_no_patch():
+LAWS = ("stiction", "dahl", "lugre", "elasto-plastic", "reset-integrator", "bristle")
+
+
+@pytest.mark.parametrize("law", mostly_slow(LAWS, ["stiction"]))
+def test_a_patch_of_the_whole_period_is_no_patch(law):
     axes = {"belt.velocity": np.linspace(0.05, 0.6, 6)}
     rest = {"stiffness": 8.0, "force": (1.0, 0.4), "start": (0.1, 0.3)}
     names = ["x_end", "velocity_end", "stick_time", "force_max", "x_max"]
-    one = ringsweep.sweep(with_zones([(0.2, 0.5, 0.4, 0.2)], (0.9, 0.8), **rest), axes, progress=False)
-    none = ringsweep.sweep(
-        on_belt({"law": "stiction", "mu_s": 0.4, "mu_k": 0.2}, span=4.0, **rest), axes, progress=False
-    )
+    patch = [(0.2, 0.5, 0.4, 0.2)], (0.9, 0.8)
+    scene = with_zones(*patch, **rest) if law == "stiction" else on_bristles(law, "belt", *patch, **rest)
+    # Steps of series end to rounding, implicit ones to their tolerance.
+    solver, share = ("auto", 1e-11) if law == "stiction" else ({"method": "implicit", "rtol": 1e-11}, 1e-8)
+    one = ringsweep.sweep(scene, axes, solver=solver, progress=False)
+    friction = {name: value for name, value in scene["friction"].items() if name not in ("frame", "elsewhere")}
+    friction |= {name: mu for name, mu in scene["zones"][0].items() if name.startswith("mu")}
+    none = ringsweep.sweep(on_belt(friction, span=4.0, **rest), axes, solver=solver, progress=False)
     for name in names:
-        assert one[name].values == pytest.approx(none[name].values, rel=1e-11, abs=1e-11)
+        assert one[name].values == pytest.approx(none[name].values, rel=share, abs=share)
     assert (one.regime == none.regime).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "frame"), [("lugre", "belt"), ("dahl", "space")])
+def test_bristles_over_patches_move_as_an_integration_from_edge_to_edge(law, frame):
+    rng, cells = np.random.default_rng(53), 20
+    axes = {
+        "initial.x": rng.uniform(-0.3, 0.3, cells),
+        "initial.velocity": rng.uniform(-2.0, 2.0, cells),
+        "belt.velocity": rng.uniform(0.05, 0.6, cells) * rng.choice([-1.0, 1.0], cells),
+        "zones.0.half_length": rng.uniform(0.03, 0.15, cells),
+    }
+    scene = on_bristles(law, frame, start=(0.0, 0.0))
+    columns = {path: xr.DataArray(column, dims="cell") for path, column in axes.items()}
+    run = ringsweep.sweep(scene, columns, solver={"method": "implicit", "rtol": 1e-10}, progress=False)
+    assert run.certified.all()
+    for i, (x, velocity, belt, half) in enumerate(zip(*axes.values(), strict=True)):
+        moved = scene | {"initial": {"x": x, "velocity": velocity}, "belt": scene["belt"] | {"velocity": belt}}
+        moved["zones"] = [scene["zones"][0] | {"half_length": half}, scene["zones"][1]]
+        ends = [run.x_end.values[i], run.velocity_end.values[i]]
+        assert ends == pytest.approx(by_scipy_on_bristles(moved), abs=1e-8)
+
+
+@pytest.mark.slow
+def test_multipliers_of_bristles_over_patches_are_those_of_neighbouring_runs():
+    scene = on_bristles(
+        "lugre", "space", velocity=0.25, stiffness=20.0, force=(12.0, 0.5), start=(0.1, 0.0), span=200.0
+    )
+    names = ("x", "velocity", "deflection")
+
+    def ends(spans, **start):
+        columns = {"time.span": spans} | {f"initial.{name}": column for name, column in start.items()}
+        axes = {path: xr.DataArray(column, dims="run") for path, column in columns.items()}
+        tight = {"method": "implicit", "rtol": 1e-11, "certify": False}
+        last = ringsweep.sweep(scene, axes, solver=tight, progress=False)
+        return np.array([last[f"{name}_end"] for name in names])
+
+    found = with_exponent(scene, certify=True)
+    of_period = period_map(lambda at: ends(np.full(6, 2.0), **dict(zip(names, at, strict=True))), ends([100.0]), 1e-6)
+    multipliers = np.sort(np.abs(np.linalg.eigvals(of_period)))[::-1]
+    assert found.certified.item() == 1
+    assert [found.multiplier_1.item(), found.multiplier_2.item()] == pytest.approx(multipliers[:2], rel=1e-4)
 
 
 def test_a_belt_carries_a_stuck_body_to_the_edge_of_a_smooth_stretch():
@@ -107,12 +227,13 @@ def test_a_large_ring_near_its_bottom_is_a_belt():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("frame", ["belt", "space"])
-def test_rk4_and_events_agree(frame):
+@pytest.mark.parametrize(("law", "frame"), [("bengisu-akay", "belt"), ("bengisu-akay", "space"), ("lugre", "belt")])
+def test_rk4_and_events_agree(law, frame):
     rest = {"stiffness": 8.0, "force": (3.0, 0.4), "start": (0.1, 0.3)}
     zones = [(0.2, 0.15, 0.6, 0.3), (-0.3, 0.1, 0.1, 0.05)]
-    scene = with_zones(zones, (0.4, 0.25), frame, 1.3, "bengisu-akay", **rest)
-    scene["friction"] |= {"alpha": 10.0, "v0": 0.02}
+    scene = with_zones(zones, (0.4, 0.25), frame, 1.3, law, **rest)
+    own = {"alpha": 10.0, "v0": 0.02} if law == "bengisu-akay" else {"sigma0": 1000.0, "sigma1": 5.0, "v_s": 0.05}
+    scene["friction"] |= own
     axes = {"belt.velocity": np.linspace(0.05, 0.5, 6)}
     run, coarse = (
         ringsweep.sweep(scene, axes, solver=solver, progress=False)
@@ -147,7 +268,6 @@ def test_a_run_that_goes_on_finds_the_zones_where_they_are_by_then(tmp_path):
     [
         ({"belt": {"velocity": 0.0}}, "scene.belt.period: missing"),
         ({"belt": {"velocity": 0.0, "period": 0.1}}, "half_length: 0.1 m is longer than half of belt.period"),
-        ({"friction": {"law": "dahl", "sigma0": 1e4}}, "scene.zones.0: not available with law dahl"),
         ({"friction": {"law": "karnopp", "dead_band": 0.1}}, "scene.zones.0: not available with law karnopp"),
         ({"friction": {"frame": "body"}}, "scene.friction.frame: .*is no frame of zones"),
         ({"zones": [{"from": 0.1, "to": 0.2}]}, "half_length"),
@@ -159,8 +279,6 @@ def test_mistakes_are_located(change, words):
     merged = {**scene, **change}
     if "friction" in change:
         merged["friction"] = {**scene["friction"], **change["friction"]}
-        if change["friction"].get("law") == "dahl":
-            merged["friction"]["elsewhere"], merged["zones"] = {"mu_k": 0.1}, [{"half_length": 0.1, "mu_k": 0.2}]
     refused(words, ringsweep.sweep, merged, {}, progress=False)
 
 

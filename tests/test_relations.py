@@ -66,6 +66,8 @@ KINDS = {
     "belt-two-way-band": Kind("belt", "karnopp", force="harmonic", span=(2, 20), two_way=BOTH),
     "belt-zones": Kind("belt", "stiction", force="harmonic", parts=("belt.period",), arcs=2, span=(2, 20)),
     "belt-zones-smooth": Kind("belt", "bengisu-akay", force="harmonic", parts=("belt.period",), arcs=1, span=(2, 20)),
+    "belt-zones-bristles": Kind("belt", "lugre", force="harmonic", parts=("belt.period",), arcs=2, span=(1, 8)),
+    "belt-space-bristles": Kind("belt", "reset-integrator", force="harmonic", arcs=1, span=(1, 8), frame="space"),
     "belt-space-load": Kind(
         "belt", "stiction", force="square", parts=SPRING + SLOPE, arcs=2, span=(2, 20), load=True, frame="space"
     ),

@@ -9,11 +9,11 @@ Read :mod:`ringsweep.physics.friction.presliding` first. `sign` is the direction
 
 from __future__ import annotations
 
-from ringsweep.compile import absorbed
-from ringsweep.models.belt.force import coefficients, length_scale
-from ringsweep.models.belt.mode import NORMAL, SLOW, Mode, after_guard, mode_at
+from ringsweep.compile import absorbed, feature
+from ringsweep.models.belt.force import at_place, coefficients, in_segment, length_scale
+from ringsweep.models.belt.mode import FAST, NORMAL, SLOW, Mode, after_guard, mode_at
 from ringsweep.models.belt.record import record_at_launch
-from ringsweep.models.belt.switch import after_load, deflection_at_start
+from ringsweep.models.belt.switch import after_load, beyond, deflection_at_start
 from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
@@ -58,7 +58,7 @@ def _initial_state_on_bristle_belt(scene):
 @slip_in_space.implements(BristleBelt)
 def _slip_on_bristle_belt(scene, y, v, forcing, angle):
     """Implement :func:`slip_in_space`; what it adds to the slip is 1 if the body counts as stuck, else 0."""
-    sign = select(v >= 0.0, 1.0, -1.0)
+    sign, scene = select(v >= 0.0, 1.0, -1.0), at_place(scene.surface, scene, y[0], forcing[0])
     stuck = _in_band(scene, v, y[2], sign)
     motion = y[0], force_in(scene.drive, forcing), y[1]
     a, b = _sliding(scene, motion, (v, y[2]), sign, BAND), _sliding(scene, motion, (v, y[2]), sign, KINETIC)
@@ -83,7 +83,7 @@ def _keep_deflection(scene, row, column, y):
 @mode_at.implements(BristleBelt)
 def _mode_at_on_bristle_belt(scene, place, t, y):
     """Implement :func:`mode_at`."""
-    _, v, z = y
+    (_, v, z), scene = y, in_segment(scene.surface, scene, place)
     sign = 1 if v > 0.0 else -1
     now = slip_at(scene, Mode(1, BAND, -1, place, ()), t, y)
     forcing = drives.turn(scene.drive, t)
@@ -106,15 +106,28 @@ def _mode_at_on_bristle_belt(scene, place, t, y):
 
 @after_guard.implements(BristleBelt)
 def _after_guard_on_bristle_belt(scene, mode, guard, t, y):
-    """Implement :func:`after_guard`; FAST is the guard of the bristles."""
+    """Implement :func:`after_guard`; FAST is the guard of the bristles, those after it are edges."""
     x, v, z = y
     if guard == NORMAL:
         return after_load(scene, mode, t, y)
     if guard == SLOW:
         return RUNNING, Mode(-mode.sign, BAND, -1, mode.place, ()), (x, 0.0, z)
-    sign = float(mode.sign)
+    if guard > FAST:
+        mode, z = _across(scene.surface, scene, mode, guard, v, z)
+        return RUNNING, mode, (x, v, z)
+    sign, scene = float(mode.sign), in_segment(scene.surface, scene, mode.place)
     z, region = after_yield(scene.law, *coefficients(scene, sign), z, sign, mode.region)
     return RUNNING, Mode(mode.sign, region, -1, mode.place, ()), (x, v, z)
+
+
+@feature("mode, z")
+def _across(surface, scene, mode, guard, v, z):
+    """Mode and deflection of a body that has crossed an edge; beyond it bristles may yield, or hold again, at once."""
+    place, sign, region = beyond(surface, mode.place, guard), float(mode.sign), mode.region
+    mu_s, mu_k = coefficients(in_segment(surface, scene, place), sign)
+    while region_guard(scene.law, mu_s, mu_k, v, z, sign, region) < 0.0:
+        z, region = after_yield(scene.law, mu_s, mu_k, z, sign, region)
+    return Mode(mode.sign, region, -1, place, ()), z
 
 
 @modes.is_lost.implements(BristleBelt)
@@ -127,6 +140,7 @@ def _is_lost_on_bristle_belt(scene, t, s):
 def _slip_of_bristle_belt(scene, mode, common, forcing, x):
     """Implement :func:`slip`; `x` is the displacement relative to the belt, the sliding velocity, the deflection."""
     motion = x[0] + forcing[0], force_in(scene.drive, forcing), x[1] + forcing[1]
+    scene = in_segment(scene.surface, scene, mode.place)
     return _sliding(scene, motion, x[1:], float(mode.sign), mode.region)
 
 
@@ -134,7 +148,7 @@ def _slip_of_bristle_belt(scene, mode, common, forcing, x):
 def _region_guards_on_bristle_belt(scene, mode, common, x):
     """Implement :func:`region_guards`: the sliding speed, m/s, and the guard of the bristles."""
     _, v, z = x
-    sign = float(mode.sign)
+    sign, scene = float(mode.sign), in_segment(scene.surface, scene, mode.place)
     return sign * v, region_guard(scene.law, *coefficients(scene, sign), v, z, sign, mode.region)
 
 

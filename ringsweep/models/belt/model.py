@@ -423,8 +423,8 @@ def _surface(structure: Structure, values: Values) -> Any:
         raise InputError(f"scene.{structure.two_way[0]}", problem)
     if not structure.arcs:
         return surface_from(structure, values, None)
-    if friction.family_of(law) is friction.Dynamic or friction.TRAITS[law].dead_band:
-        problem = f"not available with law {name}, whose friction is no function of place and speed alone"
+    if friction.TRAITS[law].dead_band:
+        problem = f"not available with law {name}, which has a dead band: choose another law"
         raise InputError(f"scene.{structure.arcs[0]}", problem)
     if structure.steady:
         raise InputError("scene.initial.steady", "not available with zones: give initial.x and initial.velocity")
@@ -460,9 +460,9 @@ def _point(structure: Structure) -> tuple[str, ...]:
 
 def _extreme_deflections(structure: Structure, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Deflections at which the bristles carry the static friction of a pull backwards and of one forwards, m."""
-    _, surfaces = _surface(structure, values)
+    mu_s, _ = zones.roughest(_surface(structure, values)[0])
     per_mu = values["body.mass"] * values["gravity"] / values["friction.sigma0"]
-    return -surfaces[-1][0] * per_mu, surfaces[0][0] * per_mu
+    return -getattr(mu_s, "backward", mu_s) * per_mu, getattr(mu_s, "forward", mu_s) * per_mu
 
 
 class StopBelt(Belt):

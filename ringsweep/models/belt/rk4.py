@@ -58,7 +58,7 @@ def _row_of_constant_step_on_belt(scene, y, forcing):
     return y[0], now.motion[2], now.friction, deflection(y, scene.law, 0.0), word_of_mode(scene, now), *zone
 
 
-@constant_step.arc_share.implements(Belt)
+@constant_step.arc_share.implements(Belt, BristleBelt)
 def _arc_share_on_belt(scene, now, h):
     """Implement :func:`constant_step.arc_share`."""
     return _share_of_narrowest(scene.surface, now, h)

@@ -55,8 +55,9 @@ def place_at(surface, x, shift):
 def _begin_on_belt(scene):
     """Implement :func:`modes.begin`; the state is ``(x, v)``, or ``(x, v, z)`` with bristles."""
     t, v = drives.beginning(scene.drive), drives.velocity_at_beginning(scene.drive, scene.initial_v)
-    now, y = Instant(t, 0.0), joined((scene.initial_x, v), deflection_at_start(scene.initial_z, scene))
-    place = place_at(scene.surface, y[0], drives.turn(scene.drive, now)[0])
+    now, x = Instant(t, 0.0), scene.initial_x
+    place = place_at(scene.surface, x, drives.turn(scene.drive, now)[0])
+    y = joined((x, v), deflection_at_start(scene.initial_z, in_segment(scene.surface, scene, place)))
     status, mode = mode_at(scene, place, now, y)
     status, mode, y = settled(scene.stops, scene, no_impact(scene.stops), now, y, status, mode)
     return t, y, status, mode
@@ -131,7 +132,7 @@ def _after_guard_on_belt(scene, mode, guard, t, y):
         return after_load(scene, mode, t, y)
     sign, region, place = mode.sign, mode.region, mode.place
     if guard > FAST:
-        place = _beyond(scene.surface, place, 1 if guard == EDGE_ABOVE else -1)
+        place = beyond(scene.surface, place, guard)
         scene = in_segment(scene.surface, scene, place)
         if holds_in_band(scene.law) and y[1] == 0.0:
             return RUNNING, mode_at_rest(scene, place, t, x), y
@@ -160,6 +161,6 @@ def _after_guard_on_belt(scene, mode, guard, t, y):
 
 
 @feature("place")
-def _beyond(surface, place, direction):
-    """Place of a body that has crossed the edge of its segment."""
-    return zones.cross_edge(surface, place, direction)
+def beyond(surface, place, guard):
+    """Place of a body that has crossed the edge of its segment to which a guard belongs."""
+    return zones.cross_edge(surface, place, 1 if guard == EDGE_ABOVE else -1)

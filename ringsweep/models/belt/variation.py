@@ -70,7 +70,7 @@ def _gradient(scene, mode, guard, t, y, rates):
 def _gradient_on_belt(scene, mode, guard, t, y, rates):
     """Implement :func:`_gradient`, by the formulas of breakaway, of the bounds of a region and of edges."""
     if guard > FAST:
-        return _gradient_of_edge(scene.surface, rates[0], drives.turn(scene.drive, t)[1]), 0.0
+        return _gradient_of_edge(scene.surface, y[1], drives.turn(scene.drive, t)[1]), 0.0
     scene = in_segment(scene.surface, scene, mode.place)
     if mode.sign != 0 and not (yields(scene, mode) and guard == SLOW):
         return 0.0, 1.0 / rates[1] if rates[1] != 0.0 else 0.0
@@ -87,16 +87,18 @@ def _gradient_on_belt(scene, mode, guard, t, y, rates):
 
 
 @feature("0.0")
-def _gradient_of_edge(surface, velocity, belt_velocity):
-    """Derivative of the distance to an edge by the displacement, divided by its rate, s/m; velocities in space."""
-    rate = zones.place_in(surface.frame, velocity, belt_velocity)
+def _gradient_of_edge(surface, v, belt_velocity):
+    """Derivative of the distance to an edge by the displacement, divided by its rate, s/m; `v` is that of sliding."""
+    rate = zones.place_in(surface.frame, v + belt_velocity, belt_velocity)
     return 1.0 / rate if rate != 0.0 else 0.0
 
 
 @_gradient.implements(BristleBelt)
 def _gradient_on_bristle_belt(scene, mode, guard, t, y, rates):
     """Implement :func:`_gradient`, by differences for the guard of the bristles."""
-    _, v, z = y
+    if guard > FAST:
+        return _gradient_of_edge(scene.surface, y[1], drives.turn(scene.drive, t)[1]), 0.0, 0.0
+    (_, v, z), scene = y, in_segment(scene.surface, scene, mode.place)
     by_v, by_z = 1.0, 0.0
     if guard == FAST:
         law, sign, region = scene.law, float(mode.sign), mode.region
