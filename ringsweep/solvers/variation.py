@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from ringsweep.compile import feature
+from ringsweep.compile import feature, inlined
 from ringsweep.models.interface import implicit, series, variation
 from ringsweep.numerics.clock import later
 from ringsweep.numerics.collocation import FEW, MANY, WEIGHTS_OF_FEW, WEIGHTS_OF_MANY, largest_trace, store
@@ -37,7 +37,13 @@ def enter_series(asked, scene, record, mode, c):
 @feature("record")
 def enter_implicit(asked, scene, record, start):
     """Record at the beginning of an implicit step."""
-    return variation.enter_mode(scene, record, start.mode, start.linear[0])
+    return variation.enter_mode(scene, record, start.mode, _rates_of_state(scene, start.forcing, start.linear[0]))
+
+
+@inlined
+def _rates_of_state(scene, forcing, rates):
+    """Rates of the state of a mode, from those of an implicit step: the place moves with the drive besides."""
+    return implicit.from_implicit(scene, forcing[1:], rates)
 
 
 @feature("record")
@@ -77,7 +83,7 @@ def along_implicit(asked, scene, record, start, taken, ends, scratch):
             x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
             store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
         # The last node is the end.
-        rates = implicit.rates(scene, start.mode, start.common, forcing, x)
+        rates = _rates_of_state(scene, forcing, implicit.rates(scene, start.mode, start.common, forcing, x))
         record = variation.propagate(scene, record, width * taken.h, rates, WEIGHTS_OF_FEW, work)
     return record
 
