@@ -78,7 +78,8 @@ def test_exponent_of_the_oscillator_of_ueda():
 
 
 @pytest.mark.slow
-def test_exponent_is_that_of_two_neighbouring_runs():
+@pytest.mark.parametrize("stops", [{}, {"stops": {"low": -1.0, "high": 1.2, "restitution": 0.7}}])
+def test_exponent_is_that_of_two_neighbouring_runs(stops):
     """Pairs of runs, brought together again after each period, in random cells with and without stops."""
     cells, periods = 20, 120
     rng = np.random.default_rng(30)
@@ -94,7 +95,7 @@ def test_exponent_is_that_of_two_neighbouring_runs():
         "initial.x": rng.uniform(-1.0, 1.0, cells),
         "initial.velocity": speed + rng.normal(0.0, 0.3, cells),
     }
-    scene = FORCED | {"friction": {"law": "tustin", "mu_s": 0.4, "mu_k": 0.2, "alpha": 2.0}}
+    scene = FORCED | {"friction": {"law": "tustin", "mu_s": 0.4, "mu_k": 0.2, "alpha": 2.0}} | stops
     found = run(scene, points | {"time.span": periods * period})
 
     def ends(state):

@@ -90,7 +90,9 @@ KINDS = {
         "ring-single-contact", "bengisu-akay", arcs=1, solver=STEPS, fixed=BROAD, two_way=BOTH_IN_ZONES
     ),
     "belt-dieterich": Kind("belt", "dieterich", force="harmonic", parts=("initial.contact_age",), span=(1, 8)),
-    "belt-stops": Kind("belt", "stiction", force="harmonic", parts=SPRING, impact=True, span=(2, 20)),
+    "belt-stops": Kind(
+        *("belt", "stiction"), force="harmonic", parts=SPRING, impact=True, span=(2, 20), record={"exponent": True}
+    ),
     "belt-stops-smooth": Kind("belt", "bengisu-akay", force="harmonic", parts=LOADS, impact=True, span=(2, 20)),
     "belt-stops-bristles": Kind("belt", "lugre", force="harmonic", impact=True, span=(1, 8)),
     "ring-exponent": Kind("ring", "hyperbolic", "sinusoidal", arcs=1, record={"exponent": True}),

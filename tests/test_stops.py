@@ -4,7 +4,7 @@ from math import atan, log, pi, sqrt
 
 import numpy as np
 import pytest
-from belts import on_belt, outcome, with_all_parts
+from belts import on_belt, outcome, with_all_parts, with_exponent
 from refusals import refused
 from tiers import mostly_slow
 
@@ -221,6 +221,47 @@ class TestJumps:
         assert found.certified.all()
 
 
+class TestExponent:
+    """At an impact from u to -e u disturbances jump by [[-e, 0], [(a+ + e a-)/u, -e]]."""
+
+    @pytest.mark.parametrize(("e", "swing"), [(0.3, 0.2), (0.6, 0.12), (0.8, 0.05)])
+    def test_multipliers_of_a_ball_on_a_vibrating_plate(self, e, swing):
+        """It leaves the plate once a period T with e U, U = g T/(1 + e), where the plate slows down by d.
+
+        So M = [[-e, 0], [(1 + e) (g - d)/U, -e]] [[1, T], [0, 1]], seen from the plate.
+        """
+        period = 0.5
+        w, fast = 2.0 * pi / period, G * period / (1.0 + e)
+        # The plate rises at (1 - e) U/2 as it hits the ball, at the phase whose sine is `swing`.
+        amplitude = 0.5 * (1.0 - e) * fast / (w * sqrt(1.0 - swing * swing))
+        slows = amplitude * w * w * swing
+        scene = between(low=0.0, e=e, stiffness=0.0, constant=-G, start=(0.0, e * fast), span=60 * period)
+        force = {"amplitude": amplitude * w * w, "frequency": 1.0 / period, "phase": np.arcsin(swing)}
+        scene["force"] |= force
+        found = with_exponent(scene, certify=True)
+        flight = np.array([[1.0, period], [0.0, 1.0]])
+        impact = np.array([[-e, 0.0], [(1.0 + e) * (G - slows) / fast, -e]])
+        exact = np.linalg.eigvals(impact @ flight)
+        turned = [(found[f"multiplier_{k}"] * np.exp(1j * found[f"multiplier_angle_{k}"])).item() for k in (1, 2)]
+        np.testing.assert_allclose(np.sort_complex(turned), np.sort_complex(exact), atol=1e-8)
+        assert found.certified.item() == 1
+
+    def test_multipliers_of_an_impact_oscillator_have_the_product_of_damper_and_impacts(self):
+        """Three impacts in three periods of the force: e^6 exp(-c T/m)."""
+        e, c, period = 0.8, 0.04, 2.0 * pi / 2.6
+        scene = between(high=0.0, e=e, damping=c, force=(1.0, 1.0 / period), start=(-0.1, 0.0), span=400 * period)
+        found = with_exponent(scene, certify=True)
+        assert found.period.item() == pytest.approx(3.0 * period, rel=1e-12)
+        product = e**6 * np.exp(-c * 3.0 * period)
+        assert (found.multiplier_1 * found.multiplier_2).item() == pytest.approx(product, rel=1e-10)
+        assert found.multiplier_1.item() == pytest.approx(sqrt(product), rel=1e-9)
+
+    def test_rest_at_a_stop_erases_the_past(self):
+        scene = between(-0.1, 0.05, 0.4, mu_k=0.02, stiffness=2.0, velocity=0.25, force=(0.9, 0.25), span=400.0)
+        found = with_exponent(scene)
+        assert (found.multiplier_1, found.multiplier_2, found.lyapunov) == (0.0, 0.0, -np.inf)
+
+
 class TestMistakes:
     """Scenes that cannot be run are refused with the path and the cause."""
 
@@ -233,7 +274,6 @@ class TestMistakes:
             ({"stops": {"high": 0.1}}, {}, "scene.stops.restitution", "missing"),
             ({"stops": {"high": 0.1, "restitution": 1.5}}, {}, "scene.stops.restitution", "1.5"),
             ({}, {"solver": {"method": "rk4", "steps": 100}}, "solver.method", "does not rebound from stops"),
-            ({}, {"record": {"exponent": True}}, "record.exponent", "scene.stops"),
             (
                 {"friction": KARNOPP | {"dead_band": 0.6}},
                 {},

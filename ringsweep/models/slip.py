@@ -16,7 +16,7 @@ from ringsweep.compile import absorbed, feature, hook, inlined, unrolled
 from ringsweep.models.interface import implicit, variation
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import drives, ring
-from ringsweep.physics.belt import Belt, BristleBelt, laden, laden_at
+from ringsweep.physics.belt import Belt, laden, laden_at
 from ringsweep.physics.forces import Laden, force_rate, load_rate
 from ringsweep.physics.friction.presliding import bristle
 from ringsweep.physics.friction.registry import holds_in_band
@@ -207,12 +207,3 @@ def _jacobian_without_bristles(scene, mode, t, y):
     now = slip_at(scene, mode, t, (y[0], v))
     by_place, by_v, _ = acceleration_slopes(laden_at(scene.drive, scene, t), now)
     return 0.0, per_radius, by_place, 0.0 if in_dead_band else by_v
-
-
-@variation.jacobian.implements(BristleBelt)
-def _jacobian_with_bristles(scene, mode, t, y):
-    """Implement :func:`variation.jacobian`."""
-    now, scene = slip_at(scene, mode, t, y), laden_at(scene.drive, scene, t)
-    by_place, by_v, _ = acceleration_slopes(scene, now)
-    (by_z,), (bundle,) = by_deflections(now.bristles, scene, now), now.bristles
-    return 0.0, 1.0, 0.0, by_place, by_v, by_z, 0.0, bundle.rate_v, bundle.rate_z

@@ -114,8 +114,8 @@ class Tangent(NamedTuple):
     gradient : tuple of float
         Gradient of the guard that has vanished since the last interval over its rate, s per unit of the state; 0
         without an event. Of several events at one instant the first one counts, since no mode lasts between them.
-    keeps : float
-        0 in a stick that keeps no disturbance of the sliding velocity; else 1.
+    keeps : tuple of float
+        1 if the mode keeps disturbances of the place, else 0; and those of the sliding velocity.
     multipliers : Multipliers
     """
 
@@ -128,7 +128,7 @@ class Tangent(NamedTuple):
     rates: Any
     entry: Any
     gradient: Any
-    keeps: float
+    keeps: tuple[float, float]
     multipliers: Multipliers
 
 
@@ -175,15 +175,22 @@ def _length(length, vector, frequency):
 
 @unrolled
 def _saltation(length, gradient, before, after, keeps):
-    """Saltation matrix from the rates before and after an event, and the logarithm of its determinant."""
+    """Saltation matrix from the rates before and after an event, and the logarithm of its determinant.
+
+    `keeps` are the factors on its first two rows.
+    """
     lines = [f"jump{i} = after[{i}] - before[{i}]" for i in range(length)]
     entries = (
-        f"{'keeps * ' if i == 1 else ''}({float(i == j)} + jump{i} * gradient[{j}])"
+        f"{f'keeps[{i}] * ' if i < 2 else ''}({float(i == j)} + jump{i} * gradient[{j}])"
         for i in range(length)
         for j in range(length)
     )
     determinant = " + ".join(f"jump{i} * gradient[{i}]" for i in range(length))
-    return [*lines, f"size = keeps * abs(1.0 + {determinant})", "return (" + ", ".join(entries) + "), log_size(size)"]
+    return [
+        *lines,
+        f"size = keeps[0] * keeps[1] * abs(1.0 + {determinant})",
+        "return (" + ", ".join(entries) + "), log_size(size)",
+    ]
 
 
 @inlined
@@ -268,12 +275,12 @@ def undisturbed(asked, scene, t):
     zero, unit = _scaled(vector, 0.0), Flow(_unit(vector), 0.0)
     blocks = Blocks(-1.0, 0.0, 0.0, t, 0.0, t, 0.0, _SKIPPED * scene.span)
     multipliers = Multipliers(nan, nan, nan, nan, nan, nan, inf, inf)
-    return Tangent(unit, unit, vector, 0.0, 0.0, blocks, zero, zero, zero, 1.0, multipliers)
+    return Tangent(unit, unit, vector, 0.0, 0.0, blocks, zero, zero, zero, (1.0, 1.0), multipliers)
 
 
 @inlined
 def enter(tangent, keeps, rates):
-    """Tangent at the beginning of a step, where the rates of the state are `rates`."""
+    """Tangent at the beginning of a step, where the rates of the state are `rates`; `keeps` as in :class:`Tangent`."""
     return _entered(tangent, rates, keeps)
 
 
@@ -282,7 +289,7 @@ def advance(tangent, h, rates, weights, work):
     """Tangent after an interval; see :func:`ringsweep.models.interface.variation.propagate`."""
     r = tangent
     step = r.step
-    if r.keeps == 0.0 or _is_pending(r.gradient):
+    if r.keeps[0] * r.keeps[1] == 0.0 or _is_pending(r.gradient):
         salt, log_determinant = _saltation(r.gradient, r.rates, r.entry, r.keeps)
         step = Flow(_product(r.vector, salt, step.matrix), step.log_determinant + log_determinant)
     log_determinant = step.log_determinant + transition(len(r.vector), h, weights, work)
@@ -294,6 +301,24 @@ def advance(tangent, h, rates, weights, work):
 def switched(tangent, gradient):
     """Tangent after an event, with the gradient of the guard over its rate."""
     return tangent if _is_pending(tangent.gradient) else _with_gradient(tangent, gradient)
+
+
+@inlined
+def rebounded(tangent, factor, gradient, rates):
+    """Tangent after an event that multiplies the sliding velocity of a state by a factor.
+
+    `rates` are those before the event, of the state that the event makes of it.
+    """
+    step = tangent.step
+    step = Flow(_with_row_scaled(gradient, step.matrix, factor), step.log_determinant + log_size(abs(factor)))
+    return _advanced(tangent, step, rates, gradient)
+
+
+@unrolled
+def _with_row_scaled(length, vector, matrix, factor):
+    """Matrix with its second row multiplied by a factor; `vector` as in :func:`_product`."""
+    n = range(length * length)
+    return ["return " + ", ".join(f"factor * matrix[{k}]" if k // length == 1 else f"matrix[{k}]" for k in n)]
 
 
 @unrolled

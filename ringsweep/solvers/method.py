@@ -81,11 +81,7 @@ class Method(ABC):
                 f"friction law {structure.law} has none: its bonds form anew at random; choose another law, or leave "
                 f"record.{asked[0]} out",
             )
-        if structure.model == "belt":
-            if structure.impact and structure.exponent:
-                problem = "cannot stand beside scene.stops: it takes no impacts; leave one of them out"
-                raise InputError("record.exponent", problem)
-        elif asked and structure.impact:
+        if asked and structure.impact and structure.model != "belt":
             raise InputError(
                 f"record.{asked[0]}",
                 "cannot stand beside scene.impact: the number of state variables changes from mode to mode; leave one "

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from ringsweep.compile import feature, hook
 from ringsweep.models import section, tangent
-from ringsweep.models.belt.force import coefficients, in_segment, stuck_gradient, stuck_rates
-from ringsweep.models.belt.mode import FAST, SLOW, yields
+from ringsweep.models.belt.force import coefficients, in_segment, moving, stuck_gradient, stuck_rates
+from ringsweep.models.belt.mode import FAST, SLOW, low_stop, yields
 from ringsweep.models.belt.record import with_tangent
 from ringsweep.models.interface import variation
+from ringsweep.models.slip import acceleration_slopes, by_deflections, slip_at, zeros
+from ringsweep.numerics.terms import joined
 from ringsweep.physics import drives, zones
-from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.belt import Belt, BristleBelt, laden_at
 from ringsweep.physics.friction.presliding import region_guard, scales
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.physics.friction.ways import along
@@ -39,13 +41,36 @@ def _enter_tangent_on_belt(scene, record, mode, rates):
     """Implement :func:`variation.enter_mode`; stick keeps no disturbance of the sliding velocity."""
     # A body stays in a dead band at any velocity in it; only one that comes from outside has that of the edge.
     arrives = stiction_band(scene.law) == 0.0 or record.tangent.gradient[1] != 0.0
-    return with_tangent(record, tangent.enter(record.tangent, 0.0 if mode.sign == 0 and arrives else 1.0, rates))
+    keeps = _kept(mode.stop, (1.0, 0.0 if mode.sign == 0 and arrives else 1.0))
+    return with_tangent(record, tangent.enter(record.tangent, keeps, rates))
 
 
 @variation.enter_mode.implements(BristleBelt)
 def _enter_tangent_on_bristle_belt(scene, record, mode, rates):
-    """Implement :func:`variation.enter_mode`; bristles keep all disturbances."""
-    return with_tangent(record, tangent.enter(record.tangent, 1.0, rates))
+    """Implement :func:`variation.enter_mode`; bristles keep all disturbances, except of a body at rest at a stop."""
+    return with_tangent(record, tangent.enter(record.tangent, _kept(mode.stop, (1.0, 1.0)), rates))
+
+
+@feature("keeps")
+def _kept(stop, keeps):
+    """Factors on disturbances of place and sliding velocity as a mode begins: a body at rest at a stop has none."""
+    return keeps if stop.rests == 0 else (0.0, 0.0)
+
+
+@variation.jacobian.implements(BristleBelt)
+def _jacobian_with_bristles(scene, mode, t, y):
+    """Implement :func:`variation.jacobian`."""
+    now, scene = slip_at(scene, mode, t, y), laden_at(scene.drive, scene, t)
+    by_place, by_v, _ = acceleration_slopes(scene, now)
+    (by_z,), (bundle,) = by_deflections(now.bristles, scene, now), now.bristles
+    first = _of_held(mode.stop, (0.0, 1.0, 0.0, by_place, by_v, by_z))
+    return *first, 0.0, bundle.rate_v, bundle.rate_z
+
+
+@feature("rows")
+def _of_held(stop, rows):
+    """Rows of a Jacobian for place and sliding velocity, which a body at rest at a stop does not change."""
+    return rows if stop.rests == 0 else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @variation.propagate.implements(Belt, BristleBelt)
@@ -58,7 +83,23 @@ def _advance_tangent_on_belt(scene, record, h, rates, weights, work):
 def _switch_tangent_on_belt(scene, record, mode, guard, t, y):
     """Implement :func:`variation.apply_saltation`."""
     rates = record.tangent.rates
+    if guard >= low_stop(scene.surface):
+        return with_tangent(record, _after_stop(scene.stops, scene, record.tangent, mode, t, y))
     return with_tangent(record, tangent.switched(record.tangent, _gradient(scene, mode, guard, t, y, rates)))
+
+
+@feature("before")
+def _after_stop(stops, scene, before, mode, t, y):
+    """Tangent of a body that hits a stop, whose sliding velocity v becomes -e (v + v_b) - v_b; or that leaves one."""
+    _, belt_velocity, acceleration = drives.turn(scene.drive, t)[:3]
+    velocity = moving(scene, y[1] + belt_velocity, y[1], belt_velocity)
+    if mode.stop.rests != 0 or velocity == 0.0:
+        return before
+    # In a dead band the momentum does not move the body.
+    factor, rates = -stops.restitution * moving(scene, 1.0, y[1], 0.0), before.rates
+    bounced = factor * rates[1] - (1.0 + stops.restitution) * acceleration
+    gradient = joined((1.0 / velocity, 0.0), zeros(rates[2:]))
+    return tangent.rebounded(before, factor, gradient, (rates[0], bounced, *rates[2:]))
 
 
 @hook

@@ -33,7 +33,7 @@ def _enter_tangent_on_ring(scene, record, mode, rates):
     """Implement :func:`variation.enter_mode`; stick keeps no disturbance of the sliding velocity."""
     # A body that comes to rest on the ring keeps no disturbance of the sliding velocity.
     keeps = 0.0 if mode.sign == 0 and stiction_band(scene.law) == 0.0 else 1.0
-    return _with(record, tangent.enter(record.long_run.tangent, keeps, rates))
+    return _with(record, tangent.enter(record.long_run.tangent, (1.0, keeps), rates))
 
 
 @variation.propagate.implements(Ring)
