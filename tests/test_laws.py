@@ -356,8 +356,13 @@ def test_unusable_file_in_ringsweep_laws_is_refused_in_one_line(tmp_path, name):
 
 @given(st.tuples(powers(1e-3, 1e3), powers(1e-6, 1e6), powers(1e-6, 1e6)))
 def test_step_ends_where_an_exponential_may_have_changed_by_its_most(drawn):
-    """First and second power of the time share the bound; one of them alone has all of it."""
-    sharpness, rate, bend = drawn
-    for v in ((0.0, rate, bend), (0.0, rate, 0.0), (0.0, 0.0, -bend)):
-        h = shorten_for_decay(sharpness, v, inf)
-        assert sharpness * (abs(v[1]) * h + abs(v[2]) * h * h) == pytest.approx(8.0)
+    """Any one power of the time has all of the bound; a few of them together may have half as much again."""
+    sharpness, *rates = drawn
+    for first, second in ((1, 2), (2, 1), (3, 16), (5, 6)):
+        v, numbers = np.zeros(ORDER + 1), np.arange(ORDER + 1)
+        v[[first, second]] = rates[0], -rates[1]
+        h = shorten_for_decay(sharpness, v, 1e10)
+        assert 8.0 * (1.0 - 1e-12) <= sharpness * (abs(v) * h**numbers).sum() <= 12.0
+        v[second] = 0.0
+        h = shorten_for_decay(sharpness, v, 1e10)
+        assert sharpness * rates[0] * h**first == pytest.approx(8.0)

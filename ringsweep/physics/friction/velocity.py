@@ -18,7 +18,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from math import inf, nan, sqrt
+from math import inf, nan
 from typing import Any
 
 from ringsweep.compile import function_from_lines, inlined, stub
@@ -39,7 +39,7 @@ from ringsweep.numerics.functions import (
 )
 from ringsweep.numerics.lanes import LANES
 from ringsweep.numerics.series import INVERSE
-from ringsweep.numerics.terms import MOST_GROUPS, PRODUCTS
+from ringsweep.numerics.terms import MOST_GROUPS, NUMBERS, ORDER, PRODUCTS, numbers_from, powers, terms, total
 from ringsweep.physics.friction.formula import COEFFICIENTS, DIRECTION, Threshold
 from ringsweep.quantities.parameters import Parameter
 
@@ -464,9 +464,10 @@ def series_term(expression, count, lanes, law, region, k, x, inner, begun, surfa
     return [*_region_prelude(expression), *_source_of_series(expression, count).step]
 
 
-# Largest change of the exponent of an exponential within a step. For a larger change the terms still grow at the end of
-# the series, so the last terms give no estimate of the error.
-_MAX_EXPONENT = 8.0
+# Largest change of the exponent of an exponential within a step, in any direction of the complex plane. The terms of
+# its series grow up to the one that this number counts; at the end of the series each is half of the one before. For a
+# larger change the last terms give no estimate of the error; for half as much again it is too small by a factor of 2.
+_MAX_EXPONENT = ORDER / 2.0
 
 
 @inlined
@@ -477,13 +478,17 @@ def shorten_for_decay(sharpness, v, h):
     ----------
     sharpness : float
         Third result of :func:`begin_series`, s/m.
-    v : ndarray of shape ``(3 or more,)``
+    v : ndarray of shape ``(ORDER + 1 or more,)``
         Series of the sliding velocity, m/s^(k + 1).
     h : float
         Step, s.
     """
     if sharpness == 0.0:
         return h
-    # Solution of |v[1]| h + |v[2]| h^2 = most.
-    most, rate = _MAX_EXPONENT / sharpness, abs(v[1])
-    return min(h, 2.0 * most / (rate + sqrt(rate * rate + 4.0 * most * abs(v[2]))))
+    while True:
+        sizes = abs(terms(v)) * powers(h)
+        exponent = sharpness * h * total(sizes)
+        if not exponent > 1.5 * _MAX_EXPONENT:
+            return h
+        # The logarithm of the exponent is a convex function of that of the step: Newton's method comes from above.
+        h *= (_MAX_EXPONENT / exponent) ** (exponent / (sharpness * h * total(sizes * numbers_from(NUMBERS, 0))))
