@@ -239,7 +239,7 @@ def errors(
     steps: Any,
     floor: Any = 0.0,
     rate_floor: Any = 0.0,
-    force_floor: float = 0.0,
+    force_floor: Any = 0.0,
     friction_floor: Any = 0.0,
 ) -> NDArray[np.float64]:
     """Bounds on the errors of runs, from second runs at another resolution.
@@ -261,10 +261,8 @@ def errors(
     floor, rate_floor : float or ndarray of shape ``(cells,)``
         Errors that both runs share: relative errors, and errors of the rate of the place, rad/s or on a belt m/s, which
         velocities have in addition.
-    force_floor : float
-        Relative error that forces and jumps have in addition.
-    friction_floor : float or ndarray of shape ``(cells,)``
-        Relative error that friction itself has in addition.
+    force_floor, friction_floor : float or ndarray of shape ``(cells,)``
+        Relative errors that forces and jumps, and that friction itself, have in addition.
 
     Returns
     -------

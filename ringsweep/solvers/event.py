@@ -36,10 +36,11 @@ _MOST_RETRIES = 3
 
 # Errors of a run that the difference from the second run does not show, found by experiment, see docs/accuracy.md. In
 # units of the remainder of a series: once in a run, and for each shared step; of forces, in units of the remainder that
-# their tolerance allows, since within a step they come from the series. In units of the tolerance of an implicit step:
-# once in a run with bristles; and for each shared step, a share of its estimate, under smooth laws and with bristles:
-# their law may bend within the step, which deceives the estimate, and all runs damp their vibrations.
-_ONCE, _SHARED, _SHARE_OF_REACTIONS = 0.2, 3.0, 0.05
+# their tolerance allows, since within a step they come from the series: once, and under friction that varies for the
+# shared steps. In units of the tolerance of an implicit step: once in a run with bristles; and for each shared step, a
+# share of its estimate, under smooth laws and with bristles: their law may bend within the step, which deceives the
+# estimate, and all runs damp their vibrations.
+_ONCE, _SHARED, _SHARE_OF_REACTIONS, _SHARED_REACTIONS = 0.2, 3.0, 0.05, 0.3
 _ONCE_IMPLICIT, _SHARED_IMPLICIT, _SHARED_BRISTLES = 0.05, 0.05, 1.0
 
 # Largest error of a run, in units of its difference from the run at the looser tolerance; and shares of the largest
@@ -184,6 +185,8 @@ class _Piecewise(Method):
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         _, magnified, left_out = audit.of_events(batch, runs.named[0])
         is_constant = family_of(type(batch.law)) is SetValued and not varies(take(batch, 0).law, 0)
+        # The largest reaction is that of one step.
+        of_forces = _SHARE_OF_REACTIONS + (0.0 if is_constant else _SHARED_REACTIONS) * np.minimum(local.series, 1.0)
         safety, share, force_share = _CONSTANT if is_constant else _BRISTLES if of_bristles else _VARYING
         because, bounds = judged(
             runs,
@@ -196,7 +199,7 @@ class _Piecewise(Method):
             steps=steps,
             floor=floor + left_out,
             rate_floor=self.tolerances()[of_bristles] * local.rate,
-            force_floor=_SHARE_OF_REACTIONS * REACTION_TOLERANCE * remainder,
+            force_floor=REACTION_TOLERANCE * remainder * of_forces,
             friction_floor=friction_floor,
         )
         may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])
