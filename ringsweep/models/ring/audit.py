@@ -47,7 +47,7 @@ def _names_wrong_segment(scene, mode, rho, under):
     wrong = False
     for place, angle, assumed, found in (
         (mode.place_1, rho - offset, of_mode[:2], under[:2]),
-        (mode.place_2, rho + offset, of_mode[2:], under[2:]),
+        (mode.place_2, rho + offset, of_mode[2:4], under[2:4]),
     ):
         if assumed != found:
             ahead, back = edge_ahead(scene.surface, place, 1) - angle, angle - edge_ahead(scene.surface, place, -1)
