@@ -23,6 +23,7 @@ from ringsweep.physics.friction.presliding import (
     SIGMA_2,
     V_S,
     after_yield,
+    bend_speed,
     bristle,
     initial_deflection,
     region_guard,
@@ -193,6 +194,12 @@ def _stribeck_steady_deflection(law, mu_s, mu_k, v):
 def _stribeck_stick_speed(law, recoil):
     """Implement :func:`stick_speed`: v_s, or the speed of the recoil if it is less."""
     return min(law.v_s, recoil)
+
+
+@bend_speed.implements(LuGre, ElastoPlastic)
+def _stribeck_bend_speed(law):
+    """Implement :func:`bend_speed`."""
+    return law.v_s
 
 
 class ResetIntegrator(NamedTuple):

@@ -112,6 +112,12 @@ def stick_speed(law, recoil):
 
 
 @hook(optional=True)
+def bend_speed(law):
+    """Sliding speed at which friction bends, and far above which it is level, m/s; by default 0: there is none."""
+    return 0.0
+
+
+@hook(optional=True)
 def initial_deflection(law, mu_s, mu_k):
     """Deflection at the launch, m; by default 0. A law with memory of its own sets it here.
 
