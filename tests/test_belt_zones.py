@@ -213,7 +213,7 @@ def test_the_millionth_period_of_a_belt_is_as_exact_as_the_first():
     assert run.x_end.item() - start == pytest.approx(stop, abs=4.0 * np.spacing(start))
 
 
-def test_bounds_tell_how_narrow_patches_far_away_magnify_the_rounding_of_their_edges():
+def test_bounds_tell_the_rounding_of_edges_of_narrow_patches_far_away():
     start, period, width, mu, speeds = 500.0, 1e-3, 1e-9, 100.0, np.linspace(0.6, 1.2, 8)
     scene = with_zones([(0.5 * period, 0.5 * width, mu, mu)], (0.0, 0.0), period=period, start=(start, 1.0), span=1.0)
     run = ringsweep.sweep(scene, {"initial.velocity": speeds}, progress=False)

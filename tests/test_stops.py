@@ -246,7 +246,7 @@ class TestExponent:
         np.testing.assert_allclose(np.sort_complex(turned), np.sort_complex(exact), atol=1e-8)
         assert found.certified.item() == 1
 
-    def test_multipliers_of_an_impact_oscillator_have_the_product_of_damper_and_impacts(self):
+    def test_multipliers_of_an_impact_oscillator_multiply_to_its_losses(self):
         """Three impacts in three periods of the force: e^6 exp(-c T/m)."""
         e, c, period = 0.8, 0.04, 2.0 * pi / 2.6
         scene = between(high=0.0, e=e, damping=c, force=(1.0, 1.0 / period), start=(-0.1, 0.0), span=400 * period)

@@ -187,7 +187,7 @@ def test_direction_in_a_formula_is_friction_typed_each_way_on_a_ring(model, meth
 
 
 @pytest.mark.slow
-def test_rk4_and_events_agree_under_a_smooth_formula_of_the_signed_velocity():
+def test_rk4_and_events_agree_under_a_formula_of_the_signed_velocity():
     mu = "mu_k*tanh(v/(w*(1 + g*direction))) + c*max(direction*v - v1, 0)"
     friction = {"law": "formula", "mu": mu, "mu_k": 0.3, "w": 0.02, "g": 0.4, "c": 0.2, "v1": 0.1}
     scene = conveyor(friction, stiffness=8.0, velocity=0.2, force=(12.0, 0.4), start=(0.1, 0.3), span=6.0)

@@ -21,6 +21,7 @@ from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, RUNNING
 from ringsweep.numerics.clock import Instant, later
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
+from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import StepControl, implicit_step, start_at, start_control
 from ringsweep.solvers.steps import Step, either, scratch_for, without_counts
@@ -134,7 +135,7 @@ def _step_if_stiff(scene, run, h_max, tolerance, scratch):
 @_step_of_family.implements(SetValued)
 def _step_by_series(family, scene, run, h_max, tolerances, scratch):
     """Implement :func:`_step_of_family`: by a series in each mode; the implicit control is passed through."""
-    guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch)
+    guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch, inf)
     rate = 0.0
     if shared > 0.0 and modes.sticks(scene, run.mode):
         # The body moves as the drive does. After an infinite acceleration of the drive steps are so short that a bound
@@ -154,14 +155,16 @@ def _goes_on(scene, run, guard, record):
 @_step_of_family.implements(Smooth)
 def _step_by_stiffness(family, scene, run, h_max, tolerances, scratch):
     """Implement :func:`_step_of_family`: implicit in a stiff stiction band, by a series elsewhere."""
+    band = inf
     # A mode relaxes fast in the stiction band alone.
     if run.mode.region < 0:
+        band = stiction_band(scene.law)
         is_stiff, guard, s, y, record, control, error = _step_if_stiff(scene, run, h_max, tolerances[1], scratch)
         if is_stiff:
             record = _goes_on(scene, run, guard, record)
             local = LocalErrors(run.local.series, 0.0, run.local.implicit + error[0])
             return True, guard, s, y, record, control, local
-    guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch)
+    guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch, band)
     local = LocalErrors(run.local.series + shared, 0.0, run.local.implicit)
     return False, guard, s, y, _goes_on(scene, run, guard, record), start_control(scene.span), local
 

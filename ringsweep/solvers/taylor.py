@@ -15,7 +15,6 @@ from ringsweep.models.interface import modes, recorder, series, variation
 from ringsweep.numerics.clock import later
 from ringsweep.numerics.series import ORDER, ascending, divide_by_time, first_root
 from ringsweep.numerics.terms import powers, terms, total
-from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.solvers.steps import FACTOR
 from ringsweep.solvers.variation import along_series, enter_series
 
@@ -71,7 +70,7 @@ def _observe_series(scene, run, s, scratch):
 
 
 @inlined
-def series_step(scene, run, h_max, tolerance, scratch):
+def series_step(scene, run, h_max, tolerance, scratch, band):
     """One step of the series, which the first event ends.
 
     Parameters
@@ -85,6 +84,8 @@ def series_step(scene, run, h_max, tolerance, scratch):
         Relative error allowed to the step.
     scratch : Scratch
         Its table of series is filled.
+    band : float
+        Speed, m/s, at whose half and above an event ends the mode in the stiction band; infinite in another mode.
 
     Returns
     -------
@@ -97,8 +98,8 @@ def series_step(scene, run, h_max, tolerance, scratch):
     run = _with_record(run, enter_series(variation.asked(scene), scene, run.record, run.mode, c))
     h = min(longest, h_max)
     guard, s = _first_event_of_series(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)
-    may_leave = guard >= 0 and run.mode.region < 0 and (s / reach) ** ORDER > _MOST_AT_EXIT
-    if may_leave and abs(series.state_at(scene, c, s)[1]) > 0.5 * stiction_band(scene.law):
+    is_rough = guard >= 0 and (s / reach) ** ORDER > _MOST_AT_EXIT
+    if is_rough and abs(series.state_at(scene, c, s)[1]) > 0.5 * band:
         # In two steps the error is nearly none.
         guard, s = -1, 0.5 * s
     record = _observe_series(scene, run, s, scratch) if s > 0.0 else run.record
