@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from belts import on_belt, with_all_parts
 from rings import course, rubs, shape
 from tiers import mostly_slow
@@ -159,6 +160,29 @@ class TestReactions:
             gap = np.maximum(run.gap_1, run.gap_2)
             assert exceeds(run, "gap_max", gap) <= 3.0
         assert max(least) > 0.0
+
+
+class TestFold:
+    """Where both roots of stick meet, reactions fall at an infinite rate: a little before, they are much greater."""
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("e", [None, 0.5])
+    def test_least_reactions_at_the_end_of_stick_are_those_of_the_mirror_image(self, e):
+        """The first body loses a contact there, the other one slides on."""
+        bounds, least = [], []
+        for sign in (1.0, -1.0):
+            scene = shape(0.5, 1.72e-4, 0.0221, 0.0077, 0.031, zone=0.033)
+            scene |= rubs("stiction", (0.52, 0.48), (0.35, 0.035))
+            scene |= course("sinusoidal", 1.0, 2.5, np.pi / 2.0, phi=0.0, omega=0.0, span=1.0, e=e)
+            numbers = {"initial.phi": [0.65, 0.85], "drive.amplitude": [2.6, 2.7]}
+            axes = {path: xr.DataArray(sign * np.array(column), dims="cell") for path, column in numbers.items()}
+            axes["time.span"] = xr.DataArray([0.12, 0.21], dims="cell")
+            found = ringsweep.sweep(scene, axes, progress=False)
+            assert found.certified.all()
+            names = ("normal_min_1", "normal_min_2")[:: int(sign)]
+            least.append([found[name].values for name in names])
+            bounds.append([found[f"{name}_error"].values for name in names])
+        assert (np.abs(least[0] - np.array(least[1])) <= np.sum(bounds, axis=0)).all()
 
 
 @pytest.mark.slow

@@ -174,6 +174,15 @@ def loads_as_stick_ends(body, m1, m2, motion, epsilon, first):
 
 
 @inlined
+def loads_at_fold(body, m1, m2, motion, epsilon):
+    """Normal reactions of a body that sticks, N, where both :func:`roots` meet; the arguments are those of `stick`."""
+    at_zero, by_F2 = ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0), by_friction(body)
+    square, linear, _ = sharing(m1, m2, at_zero, by_F2)
+    N1, N2, _ = at(-0.5 * linear / square, at_zero, by_F2)
+    return N1, N2
+
+
+@inlined
 def at(F2, at_zero, by_F2):
     """``(N_1, N_2, F)`` at the friction F_2, N; F is that of both contacts together."""
     (N1, N2, F1), (by_N1, by_N2, by_F1) = at_zero, by_F2

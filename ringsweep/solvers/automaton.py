@@ -435,6 +435,8 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
             now, status, mode, y = _after_step(scene, mode, guard, now, s, limit, y_next)
+            if guard >= 0 and s > 0.0:
+                record = recorder.as_mode_ends(scene, record, step.mode, guard, now, y_next)
             if status == RUNNING and _until(limit, now) == 0.0:
                 is_knot, status, mode, y = _pass_knot(drives.held_of(scene.drive), scene, scratch.course, mode, now, y)
                 just_switched = just_switched or is_knot

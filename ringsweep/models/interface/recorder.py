@@ -6,8 +6,8 @@ functions ``constant_step.seen``, ``series.seen_at`` and ``implicit.seen`` make 
 
 Who calls: ``automaton.py``, ``taylor.py``, ``creep.py`` and ``rk4.py`` of the solvers. ``begin`` once at launch,
 ``observe`` after each interval; ``conclude`` and ``keep_memory`` once at the end. Solvers that locate events call
-``lend`` after ``begin``, ``enter`` at the beginning of each step, ``after_event`` after each event, and ``at_jam``
-after a jam.
+``lend`` after ``begin``, ``enter`` at the beginning of each step, ``as_mode_ends`` at each event, ``after_event`` after
+it, and ``at_jam`` after a jam.
 """
 
 from __future__ import annotations
@@ -157,6 +157,29 @@ def at_jam(scene, record, normals, velocity):
         Reactions there, N.
     velocity : float
         Velocity of the body in space there, rad/s or m/s.
+
+    Returns
+    -------
+    NamedTuple
+        By default `record`.
+    """
+    return record
+
+
+@hook(optional=True)
+def as_mode_ends(scene, record, mode, guard, t, y):
+    """Record at an event that ends a step, if the series of the step is inexact there.
+
+    Parameters
+    ----------
+    scene, record, mode : NamedTuple
+        One cell, its record after the step, and the mode of the step.
+    guard : int
+        The guard that has vanished.
+    t : Instant
+        Time of the event, s.
+    y : tuple of float
+        State at the event.
 
     Returns
     -------

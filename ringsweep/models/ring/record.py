@@ -199,6 +199,9 @@ def outcome_of(record, status, t, phi, omega):
 #: Record with other extremes of the velocity, and other greatest reactions.
 with_peaks = replacing("omega_min", "omega_max", "normal_max_1", "normal_max_2")
 
+#: Record with other extremes of the reactions.
+with_reactions = replacing("normal_min_1", "normal_min_2", "normal_max_1", "normal_max_2")
+
 #: Record with another long run.
 with_long_run, _with_shocks = replacing("long_run"), replacing("shocks")
 

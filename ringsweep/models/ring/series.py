@@ -20,7 +20,7 @@ from math import cos, inf, isnan, sin
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, feature, generated, hook, inlined, replacing
-from ringsweep.models.interface import modes, series
+from ringsweep.models.interface import modes, recorder, series
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.ring import long_run
@@ -34,6 +34,7 @@ from ringsweep.models.ring.contacts import (
     places_beyond,
     zones_of,
 )
+from ringsweep.models.ring.record import with_reactions
 from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, rate_at_rest, speed_in
 from ringsweep.numerics.clock import Instant, parts
 from ringsweep.numerics.series import (
@@ -332,14 +333,42 @@ def _separated(body, normals, scale, first):
 
 
 @inlined
-def _loads_as_stick_ends(scene, mode, t, y, first):
-    """``((N1, N2), scale)`` where the reaction of contact 1 (`first`) or 2 has vanished in stick; N."""
-    body = scene.body
+def _problem_of_stick(scene, mode, t, y):
+    """Static coefficients that face the pull, motion, and acceleration of the ring, as :func:`contact.stick` takes."""
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    static, motion = facing((mu_s1, mu_s2), _pull_of(mu_s1, mode)), (sin(y[0]), cos(y[0]), ring_omega)
-    normals = contact.loads_as_stick_ends(body, *static, motion, ring_epsilon, first)
+    static = facing((mu_s1, mu_s2), _pull_of(mu_s1, mode))
+    return *static, (sin(y[0]), cos(y[0]), ring_omega), ring_epsilon
+
+
+@inlined
+def _loads_as_stick_ends(scene, mode, t, y, first):
+    """``((N1, N2), scale)`` where the reaction of contact 1 (`first`) or 2 has vanished in stick; N."""
+    body, problem = scene.body, _problem_of_stick(scene, mode, t, y)
+    ring_omega = problem[2][2]
+    normals = contact.loads_as_stick_ends(body, *problem, first)
     return normals, body.mass * (body.gravity + body.radius * ring_omega * ring_omega)
+
+
+@recorder.as_mode_ends.implements(ring.Ring)
+def _as_mode_ends_on_ring(scene, record, mode, guard, t, y):
+    """Implement :func:`recorder.as_mode_ends`: extremes of the reactions where both roots of stick meet.
+
+    Reactions go with the root of the discriminant. A discriminant that is nearly zero leaves a part of them out.
+    """
+    if mode.sign != 0 or guard != EDGE:
+        return record
+    problem = _problem_of_stick(scene, mode, t, y)
+    if not contact.folds(scene.body, problem[0], problem[1]):
+        return record
+    normal_1, normal_2 = contact.loads_at_fold(scene.body, *problem)
+    return with_reactions(
+        record,
+        min(record.normal_min_1, normal_1),
+        min(record.normal_min_2, normal_2),
+        max(record.normal_max_1, normal_1),
+        max(record.normal_max_2, normal_2),
+    )
 
 
 @modes.status_when_stalled.implements(ring.Ring)

@@ -13,7 +13,7 @@ from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import COMPLETE, JAM
 from ringsweep.models.ring import record as of_ring
-from ringsweep.models.ring.impact.mode import BOTH, CLOSES, NONE, REBOUNDS
+from ringsweep.models.ring.impact.mode import BOTH, CLOSES, NONE, REBOUNDS, ring_of
 from ringsweep.models.ring.impact.series import true_gap
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import ring
@@ -116,6 +116,15 @@ def _observe_with_impact(scene, record, t, duration, stuck, seen):
 def _enter_record_with_impact(scene, record, t, seen):
     """Implement :func:`recorder.enter`."""
     return with_base(record, recorder.enter(scene.closed, record.base, t, seen[:5]))
+
+
+@recorder.as_mode_ends.implements(ImpactRing)
+def _as_mode_ends_with_impact(scene, record, mode, guard, t, y):
+    """Implement :func:`recorder.as_mode_ends`: as without impact while both contacts hold."""
+    if mode.contacts.open != NONE:
+        return record
+    closed = ring_of(scene, mode.contacts.turned)
+    return with_base(record, recorder.as_mode_ends(closed, record.base, mode, guard, t, (y[0], y[1])))
 
 
 @inlined
