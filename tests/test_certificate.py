@@ -27,7 +27,8 @@ COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for na
 #: Random scenes with errors that two runs share: a mode that lasts for one step; a long step of a slow creep; the end
 #: of the elastic range of bristles within a step; a fast slide of a slow body; and runs that are close by chance. Then
 #: errors that small numbers hide: of a velocity at a turn; of a small jump; of the instant of the last event. Last, the
-#: reactions of a step that both runs share, and a step of bristles from where friction is level to the Stribeck speed.
+#: reactions of a step that both runs share; a step of bristles from where friction is level to the Stribeck speed; and
+#: a creep over a distance much shorter than friction can hold the body.
 BOUNDED = [
     (101, Kind("ring", "hyperbolic", "sinusoidal", arcs=1)),
     (201, Kind("ring", "tanh", "sinusoidal", arcs=1)),
@@ -41,6 +42,7 @@ BOUNDED = [
     (307, Kind("ring", "bengisu-akay", "arctan", arcs=1)),
     (20262, Kind("ring", "andersson", "sinusoidal", arcs=1)),
     (20262, Kind("belt", "elasto-plastic", force="harmonic", span=(1.0, 8.0))),
+    (904, Kind("belt", "brown-mcphee", force="harmonic", span=(2.0, 20.0))),
 ]
 
 

@@ -34,8 +34,10 @@ def _error_scales_on_belt(scene, tolerance, x):
     """Implement :func:`implicit.error_scales`: length of the motion; width of the stiction band."""
     # A load that varies may come from the displacement alone, whose size the launch tells.
     launch_x, launch_v = ring.if_load_varies(scene.body, (abs(scene.initial_x), abs(scene.initial_v)), (0.0, 0.0))
-    length = launch_x + length_scale(scene, abs(drives.turn(scene.drive, scene.span)[1]) + launch_v)
-    return tolerance * length, tolerance * stiction_band(scene.law), inf
+    band, belt = stiction_band(scene.law), abs(drives.turn(scene.drive, scene.span)[1])
+    length = launch_x + length_scale(scene, belt + launch_v)
+    # A body that creeps may go much less far than friction can hold it.
+    return tolerance * min(length, abs(x[0]) + (belt + launch_v + band) * scene.span), tolerance * band, inf
 
 
 @slip.implements(belt.Belt)
