@@ -198,6 +198,9 @@ _SAME_SCATTER, _SAME_ON_TORUS, _GROWN, _SCATTERED = 4.0, 1.5, 4.0, 1e-6
 # Two states that are apart by less than so many times the change to come may become one.
 _MERGING = 4.0
 
+# Share of a place that is rounding: a few units in the last place.
+_UNRESOLVED = 2.0**-50
+
 # Stops in a cycle are the same if they differ by less.
 _SAME_STOPS = 1e-9
 
@@ -232,6 +235,8 @@ def place_counts(scene):
 def gap(scene, mark, x, velocity, swing, fast):
     """Distance of a state from a mark, as a share of the swing of place and velocity."""
     far_x, far_v = place_counts(scene) * abs(difference(scene, x, mark.x)), abs(velocity - mark.velocity)
+    # The swing of a body at rest is rounding too.
+    far_x = select(far_x <= _UNRESOLVED * abs(x), 0.0, far_x)
     return max(far_x / max(swing, 1e-300), far_v / max(fast, 1e-300))
 
 
