@@ -221,6 +221,33 @@ class TestJumps:
         assert found.certified.all()
 
 
+@pytest.mark.slow
+class TestHeldOnBristles:
+    """A body that rests at a stop while the belt slides under its bristles: its state tells nothing of the forces."""
+
+    def test_a_force_lifts_it_as_often_and_as_far_as_under_coulomb(self):
+        """Bristles in steady sliding have constant friction; the belt is faster than the body at all times."""
+        found = []
+        for law in ("dahl", "stiction"):
+            scene = between(high=0.0, e=0.0, mu_k=0.2, law=law, stiffness=2.0, velocity=3.0, start=(0.0, 0.0), span=6.0)
+            scene["force"] |= {"amplitude": 2.5, "phase": "180 deg"}
+            found.append(ringsweep.sweep(scene, {"force.frequency": np.geomspace(0.3, 30.0, 30)}, progress=False))
+        np.testing.assert_allclose(found[0].x_min, found[1].x_min, rtol=1e-3)
+        np.testing.assert_array_equal(found[0].impacts, found[1].impacts)
+        assert found[0].certified.all()
+
+    def test_it_does_not_move_with_the_error_of_the_belt(self):
+        """So it is not taken to swing."""
+        scene = between(high=0.1, mu_k=0.1, law="dahl", constant=3.0, start=(0.1, 0.0), span=5.0)
+        drive = {"law": "formula", "velocity": "V*(1 + e*sin(w*t))", "V": 0.2, "e": 0.6}
+        found = ringsweep.sweep(
+            scene | {"belt": {}, "drive": drive}, {"drive.w": np.linspace(4.0, 20.0, 20)}, progress=False
+        )
+        assert (found.velocity_max == 0.0).all()
+        assert (ringsweep.words(found.regime) == "sliding").all()
+        assert found.certified.all()
+
+
 class TestExponent:
     """At an impact from u to -e u disturbances jump by [[-e, 0], [(a+ + e a-)/u, -e]]."""
 

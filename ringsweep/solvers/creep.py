@@ -227,6 +227,22 @@ def _first_event_by_samples(scene, start, scratch, taken, views):
 
 
 @inlined
+def _coarseness(scene, start, scratch, taken, views, g):
+    """Error of the polynomial through five instants of a step that :func:`_first_event_by_samples` takes for guard `g`.
+
+    `views` are those at the beginning, in the middle and at the end of the step.
+    """
+    before, middle, after = views
+    early = _view_within(scene, start, scratch, taken, 0.25)
+    late = _view_within(scene, start, scratch, taken, 0.75)
+    row, fraction, value = scratch.work[-1], 0.5 / INSTANTS, 0.0
+    _interpolate((before[0][g], early[0][g], middle[0][g], late[0][g], after[0][g]), row)
+    for k in range(INSTANTS, -1, -1):
+        value = row[k] + fraction * value
+    return abs(value - _view_within(scene, start, scratch, taken, fraction)[0][g])
+
+
+@inlined
 def _interpolate(samples, row):
     """Fill `row` with the polynomial, in fractions of the step, through `samples` at its equidistant instants."""
     for k in range(ORDER + 1):
@@ -363,6 +379,13 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         after = implicit.guards_and_motion(scene, mode, common, end, x_next)
         if event >= 0:
             break
+        held, allowed = implicit.held_guard(scene, mode, tolerance, after[1])
+        if held >= 0:
+            g = held - scratch.first_guard
+            h_norm = max(h_norm, _coarseness(scene, start, scratch, taken, (before, middle, after), g) / allowed)
+            if not h_norm <= 1.0:
+                s = h = h * max(0.2, 0.9 * h_norm**-0.2)
+                continue
         error_norm, near, near_zero = h_norm, False, implicit.near_zero(scene, middle[1])
         for g in range(len(near_zero)):
             near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])

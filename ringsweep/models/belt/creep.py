@@ -11,12 +11,12 @@ from math import inf, nan
 from ringsweep.compile import feature, inlined, unrolled
 from ringsweep.models.belt.force import coefficients, if_force, in_segment, length_scale, located, rounding_of_load
 from ringsweep.models.belt.mode import yields
-from ringsweep.models.belt.stops import guarded, held_linear, held_rates, is_away
+from ringsweep.models.belt.stops import guarded, held_linear, held_place, held_rates, is_away, pressed
 from ringsweep.models.interface import implicit, modes
 from ringsweep.models.slip import Slip, linear_slip, rates_in_slip, region_guards, relaxes, slip
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import belt, drives, ring, zones
-from ringsweep.physics.belt import laden
+from ringsweep.physics.belt import BristleBelt, laden
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.presliding import shown  # noqa: F401
 from ringsweep.physics.friction.velocity import friction_in, stiction_band
@@ -85,6 +85,7 @@ def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
     The motion is displacement, velocity and acceleration in space, friction (N), displacement relative to the belt,
     sliding velocity, acceleration of the belt, and deflection of the bristles (NaN without bristles).
     """
+    x = held_place(scene.stops, x, mode, forcing)
     now, body = slip(scene, mode, common, forcing, x), laden(scene.drive, scene, forcing).body
     acceleration, _ = ring.acceleration(body, *now.K, now.motion)
     normal, _ = ring.reactions(body, *now.K, now.motion)
@@ -94,6 +95,12 @@ def _guards_and_motion_on_belt(scene, mode, common, forcing, x):
     guards = _with_edges(scene.surface, guards, mode.place, place, forcing[0])
     guards, acceleration = guarded(scene.stops, guards, mode, place, acceleration)
     return guards, (place, velocity, acceleration, friction, x[0], x[1], forcing[2], deflection(x, scene.law, nan))
+
+
+@implicit.held_guard.implements(BristleBelt)
+def _held_guard_on_bristle_belt(scene, mode, tolerance, motion):
+    """Implement :func:`implicit.held_guard`."""
+    return pressed(scene.stops, scene, mode, tolerance, motion[0])
 
 
 @unrolled

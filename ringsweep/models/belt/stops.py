@@ -238,6 +238,22 @@ def guarded(stops, guards, mode, x, acceleration):
     return joined(guards, (-acceleration if side < 0 else 1.0, acceleration if side > 0 else 1.0)), 0.0
 
 
+@feature("x")
+def held_place(stops, x, mode, forcing):
+    """State of an implicit step of a body that rests at a stop, without the error of its place and velocity."""
+    side = mode.stop.rests
+    if side == 0:
+        return x
+    return (stops.high if side > 0 else stops.low) - forcing[0], -forcing[1], *x[2:]
+
+
+@feature("(-1, 1.0)")
+def pressed(stops, scene, mode, tolerance, x):
+    """Guard of the stop that holds a body at the place `x`, -1 if none does; and the error allowed to it, m/s^2."""
+    guard = low_stop(scene.surface) + max(mode.stop.rests, 0) if mode.stop.rests != 0 else -1
+    return guard, tolerance * located(scene, x, 0.0).size
+
+
 @feature("True")
 def is_away(stops, mode, y):
     """Whether a body is not at a stop. At one, and as a body leaves it, steps of laws without memory are series."""

@@ -193,6 +193,29 @@ def guards_and_motion(scene, mode, common, forcing, x):
     """
 
 
+@hook(optional=True)
+def held_guard(scene, mode, tolerance, motion):
+    """The guard that tells when a body is held no longer, which may vary while the state rests.
+
+    The error of the state does not tell whether a step is too long for it.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    tolerance : float
+        Relative error allowed to an implicit step.
+    motion : tuple of float
+        Second part of the view at the end of the step.
+
+    Returns
+    -------
+    tuple
+        ``(guard, error)``: row of the guard in a series, by default -1 for none; error allowed to it, in its unit.
+    """
+    return -1, 1.0
+
+
 @hook
 def near_zero(scene, motion):
     """How near to zero each guard may come before the solver looks for a root within the step.
