@@ -160,7 +160,8 @@ class TestBody:
         assert (gone_on.reversals.values > ended.reversals.values).any()
         for name in ("regime", "motion", "separating_contact"):
             np.testing.assert_array_equal(gone_on[name], ended[name], err_msg=name)
-        np.testing.assert_allclose(gone_on.t_separation, ended.t_separation, rtol=1e-11)
+        # Under a smooth law rounding may decide whether a step is taken in two, and a step has its own error.
+        np.testing.assert_allclose(gone_on.t_separation, ended.t_separation, rtol=1e-11 if smooth else 1e-13)
 
     @pytest.mark.parametrize("half_angle", [0.0, np.pi])
     def test_pivot_passes_a_zone_of_no_width_and_the_ends_of_one_all_around(self, half_angle):
