@@ -99,6 +99,26 @@ class TestClosedForms:
         gained = load * s - a / w * (np.cos(angle + w * s) - np.cos(angle))
         assert found.velocity_end[1].item() == pytest.approx(side * gained, rel=1e-9)
 
+    @pytest.mark.parametrize("side", [1, -1])
+    def test_on_a_belt_at_rest_a_stop_bears_what_friction_does_not(self, side):
+        """Again and again, until a force a + b sin(w t) breaks the body loose the other way."""
+        mu_s, mu_k, cells, late = 0.3, 0.1, 40, 0.03
+        rng = np.random.default_rng(11)
+        low, b = rng.uniform(-3.5, -0.5, cells) - mu_s * G, rng.uniform(4.0, 8.0, cells)
+        a, w = low + b, 2.0 * pi * rng.uniform(0.5, 5.0, cells)
+        leaves = (pi + np.arcsin((mu_s * G + a) / b)) / w
+        scene = between(high=0.2, mu_s=mu_s, mu_k=mu_k, stiffness=0.0, velocity=0.0, start=(side * 0.2, 0.0), span=1.0)
+        if side < 0:
+            scene["stops"] = {"low": -0.2, "restitution": 0.5}
+        scene["force"] |= {"amplitude": 0.0, "frequency": 1.0}
+        axes = {"force.constant": side * a, "force.amplitude": side * b, "force.frequency": 0.5 * w / pi}
+        axes = {path: column.tolist() for path, column in (axes | {"time.span": leaves + late / w}).items()}
+        found = ringsweep.run({"scene": scene, "sweep": {"points": axes}}, progress=False)
+        gained = (a + mu_k * G) * late / w + b / w * (np.cos(w * leaves) - np.cos(w * leaves + late))
+        np.testing.assert_allclose(found.stick_time, leaves, rtol=1e-12)
+        np.testing.assert_allclose(found.velocity_end, side * gained, rtol=1e-9)
+        assert (found.impacts == 0).all()
+
     def test_a_stop_without_restitution_stops_the_body_at_once(self):
         found = outcome(between(high=0.1, e=0.0, mu_k=0.1, stiffness=1.0, start=(0.0, 0.8), span=9.0))
         assert (found.impacts, found.x_end, found.velocity_end) == (1, 0.1, 0.0)

@@ -18,6 +18,7 @@ from ringsweep.models.belt.mode import (
     ACCELERATION,
     FAST,
     FORCE,
+    NORMAL,
     SHIFT,
     SLOW,
     VELOCITY,
@@ -86,19 +87,20 @@ def settled(stops, scene, stop, t, y, status, mode):
     # Rounding does not lift a body that has rested at a stop before the velocity of the belt jumped.
     still = stop.rests != 0 or _is_still(y[1], moving(scene, y[1] + forcing[1], y[1], forcing[1]))
     if status == RUNNING and side != 0 and still:
-        mode, y = _at_rest(scene, mode.place, side, stop, t, y)
+        mode, y = _at_rest(scene, mode, side, stop, t, y)
         return status, mode, y
     return status, with_stop(mode, stop), y
 
 
 @inlined
-def _at_rest(scene, place, side, stop, t, y):
-    """Mode and state of a body at rest in space at a stop: held there, stuck to the belt, or about to leave."""
-    forcing = drives.turn(scene.drive, t)
-    v = -forcing[1]
-    y = scene.stops.high if side > 0 else scene.stops.low, v, *y[2:]
-    _, mode = mode_at(scene, place, t, y)
-    if v == 0.0:
+def _at_rest(scene, mode, side, stop, t, y):
+    """Mode and state of a body at rest in space at a stop: held there, stuck to the belt, or about to leave.
+
+    `mode` is that of a body without stops.
+    """
+    forcing, place = drives.turn(scene.drive, t), mode.place
+    y = scene.stops.high if side > 0 else scene.stops.low, -forcing[1], *y[2:]
+    if y[1] == 0.0:
         # The belt begins to move, or stays at rest.
         turns = forcing[2] if forcing[2] != 0.0 else drives.jerk_at(scene.drive, t)
         sign = 1 if turns < 0.0 else -1
@@ -150,9 +152,10 @@ def _impact(scene, mode, side, t, y):
     forcing, e, before = drives.turn(scene.drive, t), scene.stops.restitution, mode.stop
     velocity = moving(scene, y[1] + forcing[1], y[1], forcing[1])
     closing = side * velocity
-    if closing <= 0.0 or _is_still(y[1], velocity):
-        return _at_rest(scene, mode.place, side, before, t, y)
     x, v = scene.stops.high if side > 0 else scene.stops.low, -e * velocity - forcing[1]
+    _, at_rest = mode_at(scene, mode.place, t, (x, -forcing[1], *y[2:]))
+    if closing <= 0.0 or _is_still(y[1], velocity):
+        return _at_rest(scene, at_rest, side, before, t, y)
     rebound, speed_max, lasts, short = e * closing, max(before.speed_max, closing), 0.0, e == 0.0
     # On a belt at rest friction turns round with the body, else the slip of the last rebounds is that at rest.
     rises, falls = (x, v, *y[2:]), (x, y[1] if forcing[1] == 0.0 else -forcing[1], *y[2:])
@@ -165,7 +168,7 @@ def _impact(scene, mode, side, t, y):
         short = rebound * rebound <= 2.0 * away * SUMMED * length
         lasts = rebound * (1.0 / away + ratio / back) / (1.0 - e * ratio)
     if short:
-        return _at_rest(scene, mode.place, side, AtStop(0, before.impacts + 1.0, speed_max, 0.0, lasts), t, y)
+        return _at_rest(scene, at_rest, side, AtStop(0, before.impacts + 1.0, speed_max, 0.0, lasts), t, y)
     return with_stop(after, AtStop(0, before.impacts + 1.0, speed_max, -side * rebound, 0.0)), rises
 
 
@@ -189,7 +192,10 @@ def expand_stops(stops, scene, mode, tolerance, c, h):
         c[row, 0] = side * (place - c[X, 0])
     side = _side_at(stops, c[X, 0])
     if side != 0:
-        row = low + 1 if side > 0 else low
+        row, entry = low + 1 if side > 0 else low, mode.entry_guard
+        if mode.sign == 0 and entry > NORMAL:
+            # The stop bore what exceeded the breakaway force: rounding does not break the body loose again.
+            c[entry, 0] = max(c[entry, 0], 0.0)
         if _is_still(c[V, 0], c[VELOCITY, 0]):
             c[row, 1] = 0.0
             if abs(c[ACCELERATION, 0]) <= _BALANCED * located(scene, c[X, 0], 0.0).size:
