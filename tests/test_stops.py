@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from belts import on_belt, outcome, with_all_parts, with_exponent
 from refusals import refused
+from scipy.integrate import quad
 from tiers import mostly_slow
 
 import ringsweep
@@ -239,6 +240,26 @@ class TestJumps:
         np.testing.assert_allclose(found.velocity_end, gain * s, atol=1e-12)
         np.testing.assert_allclose(found.stick_time, 1.0, atol=1e-12)
         assert found.certified.all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["ruina", "dieterich"])
+def test_a_stopped_body_slides_off_through_speeds_as_small_as_numbers_go(law):
+    """Friction mu0 + a ln(v/V), which no age changes (b = 0), begins where exp(mu0/a) relaxes it within 1e-90 s."""
+    mu_0, fast, pull = 0.6, 1e-4, 7.0
+    friction = {"law": law, "mu0": mu_0, "b": 0.0, "critical_distance": 1e-4, "reference_velocity": fast}
+    scene = on_belt(friction | {"a": 0.01}, 0.0, damping=0.0, velocity=0.0, start=(0.0, -1.0), span=1.0)
+    scene |= {"force": {"constant": pull}, "stops": {"low": 0.0, "restitution": 0.0}}
+    found = ringsweep.sweep(scene, {"friction.a": np.geomspace(0.003, 0.01, 10)}, progress=False)
+    columns = (column.values.tolist() for column in (found.friction_a, found.velocity_end, found.x_end))
+    for a, v, x in zip(*columns, strict=True):
+
+        def pace(v, a=a):
+            return 1.0 / (pull - G * (mu_0 + a * log(v / fast)))
+
+        assert quad(pace, 0.0, v)[0] == pytest.approx(1.0, rel=1e-7)
+        assert quad(lambda v, pace=pace: v * pace(v), 0.0, v)[0] == pytest.approx(x, rel=1e-7)
+    assert found.certified.all()
 
 
 @pytest.mark.slow

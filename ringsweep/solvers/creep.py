@@ -274,9 +274,9 @@ def _root_and_below(samples, work):
     return roots[0], 1.0 if count == 1 else 0.5 * (roots[0] + roots[1])
 
 
-# Largest factor by which the length of a step grows; and factor by which a run at the looser tolerance of a certificate
-# may take longer steps.
-_MOST_GROWTH, _LONGER = 30.0, FACTOR**0.2
+# Largest factor by which the length of a step grows, and least one by which it shrinks at once; and factor by which a
+# run at the looser tolerance of a certificate may take longer steps.
+_MOST_GROWTH, _MOST_DECREASE, _LONGER = 30.0, 0.2, FACTOR**0.2
 
 
 class StepControl(NamedTuple):
@@ -318,7 +318,9 @@ def _next_control(control, s, error, shortened, rejected):
     h = s * min(1.0 if rejected else _MOST_GROWTH, 0.9 * factor)
     # Towards the end of a creep, steps shorten at a steady rate, which the last step shows (Gustafsson).
     if control.last_h > 0.0:
-        h = min(h, s * 0.9 * s / control.last_h * (factor * factor / control.last_factor))
+        # A length that an event has made shorter by decades is no rate.
+        rate = s / control.last_h * (factor * factor / control.last_factor)
+        h = min(h, s * max(_MOST_DECREASE, 0.9 * rate))
     shared = control.shared and 0.9 * factor * _LONGER >= _MOST_GROWTH
     # A shortened step says little about the next one.
     if shortened:
@@ -366,7 +368,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         h_norm = _error_norm(error, scales, linear)
         if not h_norm <= 1.0:
             # The step up to an event has stages of its own and may have a larger error.
-            s = h = h * max(0.2, 0.9 * h_norm**-0.2)
+            s = h = h * max(_MOST_DECREASE, 0.9 * h_norm**-0.2)
             event = -1
             continue
         speed_next = abs(x_next[1])
@@ -384,7 +386,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             g = held - scratch.first_guard
             h_norm = max(h_norm, _coarseness(scene, start, scratch, taken, (before, middle, after), g) / allowed)
             if not h_norm <= 1.0:
-                s = h = h * max(0.2, 0.9 * h_norm**-0.2)
+                s = h = h * max(_MOST_DECREASE, 0.9 * h_norm**-0.2)
                 continue
         error_norm, near, near_zero = h_norm, False, implicit.near_zero(scene, middle[1])
         for g in range(len(near_zero)):
