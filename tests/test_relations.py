@@ -191,6 +191,45 @@ class TestRandomScenes:
         assert relations.unequal(first, second.isel(cell=np.argsort(order))) == {}
 
 
+class TestLaunch:
+    """Bodies released from rest, some of which lose a contact at once."""
+
+    @staticmethod
+    def released(name):
+        """Cells of a kind, which differ from those of another kind by the friction law alone."""
+        run, kind = relations.random_scenes(KINDS["ring"], 1000, np.random.default_rng(48)), KINDS[name]
+        own = relations.random_scenes(kind, 1000, np.random.default_rng(48)).numbers
+        numbers = own | {path: column for path, column in run.numbers.items() if path in own}
+        numbers |= {"drive.amplitude": 10.0 * numbers["drive.amplitude"], "initial.omega": np.zeros(1000)}
+        return relations.Run(kind, numbers | {"time.span": np.full(1000, 1e-9)}, kind.scene)
+
+    def test_reactions_at_launch_are_those_of_the_mirror_image(self):
+        run = self.released("ring")
+        found, mirrored = run.outcomes(), relations.mirror_of(relations.mirrored(run).outcomes())
+        assert (found.t_end == 0.0).sum() > 50
+        assert relations.differing(found, mirrored) == {}
+        cell = np.flatnonzero((found.t_end == 0.0) & (found.normal_max_2 > 0.0))[0]
+        history = ringsweep.simulate(relations.placed(run, cell))
+        assert (history.normal_1.item(), history.normal_2.item()) == (0.0, found.normal_max_2[cell])
+
+    @pytest.mark.parametrize(
+        ("name", "same"),
+        mostly_slow(
+            [("ring", "ring-impact"), ("ring-smooth", "ring-rk4"), ("ring-smooth", "ring-dahl")],
+            [("ring", "ring-impact")],
+        ),
+    )
+    def test_contact_that_is_not_lost_at_launch_carries_the_body_alone(self, name, same):
+        """As in the pivot with which a run goes on. Under laws without friction at rest it does not matter which."""
+        found, other = self.released(name).outcomes(), self.released(same).outcomes()
+        lost = (found.separating_contact > 0).values
+        assert lost.sum() > 50
+        np.testing.assert_array_equal(found.separating_contact[lost], other.separating_contact[lost])
+        for least, greatest in (("normal_min_1", "normal_max_1"), ("normal_min_2", "normal_max_2")):
+            np.testing.assert_array_equal(found[least][lost], found[greatest][lost])
+            np.testing.assert_allclose(found[greatest][lost], other[greatest][lost], rtol=1e-6)
+
+
 class TestSweeps:
     """The way in which cells are swept does not matter."""
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import inf, isfinite, isnan
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, feature, hook, inlined, unrolled
+from ringsweep.compile import absorbed, feature, hook, inlined, replacing, unrolled
 from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import exceeds, larger_eigenvalue
@@ -167,6 +167,21 @@ def _verdict_in_slip(scene, before, now):
     if fraction > 1.0:
         return RUNNING, 1.0
     return ENDS[contact.lost(scene.body, first == fraction, second == fraction)], fraction
+
+
+_with_contacts = replacing("rates", "normal_1", "normal_2", "determinant")
+
+
+@constant_step.at_once.implements(Ring, BristleRing)
+def _at_once_in_slip(scene, y, forcing, now):
+    """Implement :func:`constant_step.at_once`; a body that jams has no determinant."""
+    if constant_step.holds(scene, now) or not isfinite(now.rates[1]):
+        return now
+    (K, motion), body = (slip_in_space(scene, y, now.v, forcing, now.motion[:2])[0].K, now.motion), scene.body
+    found, closed = contact.sliding(body, *K, motion), (now.normal_1, now.normal_2, now.rates[1])
+    normal_1, normal_2, acceleration = contact.opened(body, found, closed, K, (0.0, 0.0), 1, motion, 0.0)
+    rates = joined((now.rates[0], acceleration), now.rates[2:])
+    return _with_contacts(now, rates, normal_1, normal_2, 0.0 if found == contact.IMPOSSIBLE else 1.0)
 
 
 @inlined

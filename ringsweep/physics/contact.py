@@ -229,11 +229,12 @@ def opening(body, friction, static, slides, motion, epsilon):
 
 
 @inlined
-def _carries_alone(body, side, k, m, slides, motion, epsilon):
-    """Whether one contact can carry the body while the other contact opens.
+def _alone(body, side, k, m, slides, motion, epsilon):
+    """Reaction (N) and angular acceleration (rad/s^2) of a body on one contact while the other contact opens.
 
-    `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are friction and static friction at this contact, a
-    TwoWay of a body at rest if they depend on the direction, and the rest is as for :func:`opening`.
+    Both are zero if this contact cannot carry the body. `side` is -1 for contact 1 and +1 for contact 2; `k` and `m`
+    are friction and static friction at this contact, a TwoWay of a body at rest if they depend on the direction, and
+    the rest is as for :func:`opening`.
     """
     b, (sin_phi, cos_phi, omega), (sb, cb) = body, motion, (side * body.sin_beta, body.cos_beta)
     # The moment of inertia may be zero; a lower bound avoids the division by zero.
@@ -247,7 +248,7 @@ def _carries_alone(body, side, k, m, slides, motion, epsilon):
     if slides == 0:
         psi_dd, alpha_dd, load, pull = pivot.in_stick(f, carried)
         if load > 0.0 and abs(pull) <= along(m, -pull) * load and arm * (psi_dd - alpha_dd) > least:
-            return True
+            return load, psi_dd
     for sign in (-1.0, 1.0):
         mu = along(k, sign)
         K = mu if slides != 0 else -sign * mu
@@ -255,8 +256,8 @@ def _carries_alone(body, side, k, m, slides, motion, epsilon):
         starts = slides != 0 or sign * pivot.sliding_acceleration(f, found, carried) > 0.0
         opens = arm * (found[0] - found[1]) > least
         if pivot.determinant(f, K) > 0.0 and found[2] > 0.0 and starts and opens:
-            return True
-    return False
+            return found[2], found[0]
+    return 0.0, 0.0
 
 
 @opening.implements(ring.TwoContacts)
@@ -268,11 +269,44 @@ def _opening_of_two(body, friction, static, slides, motion, epsilon):
     # Without a load both gaps open.
     if body.cos_beta * across + body.sin_beta * abs(along) <= 0.0:
         return OPEN_BOTH
-    first = _carries_alone(body, 1.0, friction[1], static[1], slides, motion, epsilon)
-    second = _carries_alone(body, -1.0, friction[0], static[0], slides, motion, epsilon)
-    if first:
-        return OPEN_BOTH if second else OPEN_1
-    return OPEN_2 if second else IMPOSSIBLE
+    first, _ = _alone(body, 1.0, friction[1], static[1], slides, motion, epsilon)
+    second, _ = _alone(body, -1.0, friction[0], static[0], slides, motion, epsilon)
+    if first > 0.0:
+        return OPEN_BOTH if second > 0.0 else OPEN_1
+    return OPEN_2 if second > 0.0 else IMPOSSIBLE
+
+
+@hook(optional=True)
+def opened(body, opens, closed, friction, static, slides, motion, epsilon):
+    """Reactions and angular acceleration of a body at the instant at which its contacts cannot stay closed.
+
+    Parameters
+    ----------
+    opens : int
+        OPEN_1 or OPEN_2; or OPEN_BOTH or IMPOSSIBLE, if no contact carries the body.
+    closed : tuple of float
+        Reactions N1 and N2, N, and angular acceleration, rad/s^2, that follow from closed contacts.
+    body, friction, static, slides, motion, epsilon
+        As for :func:`opening`.
+
+    Returns
+    -------
+    tuple of float
+        ``(N1, N2, phi_dd)``. By default those of closed contacts without a pull: of a body with one contact.
+    """
+    return max(closed[0], 0.0), max(closed[1], 0.0), closed[2]
+
+
+@opened.implements(ring.TwoContacts)
+def _opened_of_two(body, opens, closed, friction, static, slides, motion, epsilon):
+    """Implement :func:`opened` for two contacts; a body without a contact does not change its spin."""
+    if opens == OPEN_1:
+        load, phi_dd = _alone(body, 1.0, friction[1], static[1], slides, motion, epsilon)
+        return 0.0, load, phi_dd
+    if opens == OPEN_2:
+        load, phi_dd = _alone(body, -1.0, friction[0], static[0], slides, motion, epsilon)
+        return load, 0.0, phi_dd
+    return 0.0, 0.0, 0.0
 
 
 @inlined
@@ -339,6 +373,12 @@ def _either(static, forward, backward):
 
 
 @inlined
+def at_breakaway(static, forward, backward):
+    """Friction of a body at rest, as for :func:`opening`; the arguments are those of :func:`at_rest`."""
+    return _either(static[0], forward[0], backward[0]), _either(static[1], forward[1], backward[1])
+
+
+@inlined
 def at_rest(body, static, forward, backward, motion, epsilon, released):
     """Mode of a body that is at rest on the ring.
 
@@ -380,8 +420,7 @@ def at_rest(body, static, forward, backward, motion, epsilon, released):
     loaded = body.gravity > 0.0 or motion[2] != 0.0
     if loaded and max(held, max(ahead, back)) >= -_ROUNDING:
         return FORWARD if ahead >= max(held, back) else BACKWARD if back >= held else STICK
-    friction = _either(static[0], forward[0], backward[0]), _either(static[1], forward[1], backward[1])
-    return opening(body, friction, static, 0, motion, epsilon)
+    return opening(body, at_breakaway(static, forward, backward), static, 0, motion, epsilon)
 
 
 @inlined

@@ -195,21 +195,21 @@ def _step_in(scene, run, h_max, tolerances, scratch):
 
 
 @hook
-def _begin_record(family, scene, mode, now, y, tolerances, c):
-    """Record at the beginning of a run, at `now` in the state `y` of a mode; fills the table `c` for series."""
+def _seen_at_launch(family, scene, mode, now, y, tolerances, c):
+    """What the recorder is shown at `now` in the state `y` of a mode; fills the table `c` for series."""
 
 
-@_begin_record.implements(SetValued, Smooth)
-def _begin_by_series(family, scene, mode, now, y, tolerances, c):
-    """Implement :func:`_begin_record`."""
+@_seen_at_launch.implements(SetValued, Smooth)
+def _seen_by_series(family, scene, mode, now, y, tolerances, c):
+    """Implement :func:`_seen_at_launch`."""
     series.fill_table(scene, mode, now, y, tolerances[0], c)
-    return recorder.begin(scene, now.t, series.seen_at_start(scene, c))
+    return series.seen_at_start(scene, c)
 
 
-@_begin_record.implements(Dynamic)
-def _begin_implicitly(family, scene, mode, now, y, tolerances, c):
-    """Implement :func:`_begin_record`."""
-    return recorder.begin(scene, now.t, _seen_in(scene, mode, drives.turn(scene.drive, now), y))
+@_seen_at_launch.implements(Dynamic)
+def _seen_implicitly(family, scene, mode, now, y, tolerances, c):
+    """Implement :func:`_seen_at_launch`."""
+    return _seen_in(scene, mode, drives.turn(scene.drive, now), y)
 
 
 @inlined
@@ -395,8 +395,10 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         drives.pass_knot(scene.drive, Instant(0.0, 0.0))
         t, y, status, mode = modes.begin(scene)
         now = Instant(t, 0.0)
-        begun = _begin_record(family(scene.law), scene, mode, now, y, tolerances, c)
-        record = recorder.lend(scene, begun, take(rows, i))
+        seen = _seen_at_launch(family(scene.law), scene, mode, now, y, tolerances, c)
+        if status != RUNNING:
+            seen = recorder.at_once(scene, status, mode, now, y, seen)
+        record = recorder.lend(scene, recorder.begin(scene, now.t, seen), take(rows, i))
         record = recorder.after_event(scene, record, mode, mode, t)
         control = start_control(1e-6 * scene.span)
         audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0)
@@ -404,7 +406,6 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         t_before, s = t, scene.span
         t_judged, least_gain = t, scene.span * (PATIENCE / max_steps)
         just_switched = True
-        is_implicit = False
         while status == RUNNING:
             # Near a jam, steps shorter than the rounding of time still move the state, but not for ever.
             t = now.t
@@ -452,10 +453,11 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             if s == 0.0 and status != RUNNING:
                 # The history must show the end of a mode that lasts no time.
                 count = _store_row(scene, step, c, 0.0, y, history, count)
-        if count == 0:
+        if count < min(1, len(history.times)):
             # A run that ends at launch has a history of one row.
-            step = Step(mode, is_implicit, now, 0.0, y, y)
-            count = _store_row(scene, step, c, 0.0, y, history, count)
+            history.times[0] = now.t
+            _copy_into(history.table[0], modes.row(scene, mode, drives.turn(scene.drive, now), y, seen))
+            count = 1
         if status == JAM:
             s, y, normals = modes.limit_of_jam(scene, mode, now, y)
             now = later(now, s)

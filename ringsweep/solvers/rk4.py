@@ -525,10 +525,17 @@ def _advance_block(diagnosed, batch, launches, buffers, live, stretch, results):
 
 
 @inlined
+def _inspection_at_launch(scene, y, table):
+    """Inspection of the state at t = 0; a run may end there."""
+    forcing = lookup(scene.drive, table, 0)
+    return constant_step.at_once(scene, y, forcing, constant_step.inspect(scene, y, forcing))
+
+
+@inlined
 def _initial_run(batch, launches, cell, table):
     """Run of a cell at t = 0. With any table it also serves as an example of the type."""
     scene, y = take(batch, cell), take(launches, cell)
-    now = constant_step.inspect(scene, y, lookup(scene.drive, table, 0))
+    now = _inspection_at_launch(scene, y, table)
     record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now))
     return _Run(y, now, record, Diagnosis(0.0, inf, 0.0), LIVE)
 
@@ -541,7 +548,7 @@ def _history(batch, steps, interval, times, rows):
     table = np.empty((3, _MOST_COLUMNS))
     y = constant_step.initial_state(scene)
     _fill_table(table, scene.drive, 0, 1, h)
-    now = constant_step.inspect(scene, y, lookup(scene.drive, table, 0))
+    now = _inspection_at_launch(scene, y, table)
     status, _ = constant_step.verdict(scene, now, now)
     k, count, t = 0, 0, 0.0
     while True:

@@ -13,8 +13,8 @@ A step advances several runs side by side: it gets vector lanes in place of floa
 and the recorder's ``observe``) are written without ``if``, see :mod:`ringsweep.numerics.functions`, and all numbers of
 an inspection and of a record are floats. A step in which a run ends is repeated for this run with floats.
 
-Only ``ringsweep/solvers/rk4.py`` calls these functions: ``initial_state`` once, ``row`` for a history, the others in
-each step.
+Only ``ringsweep/solvers/rk4.py`` calls these functions: ``initial_state`` and ``at_once`` once, ``row`` for a history,
+the others in each step.
 """
 
 from __future__ import annotations
@@ -80,6 +80,25 @@ def inspect(scene, y, forcing):
     NamedTuple
         With the field ``rates``, a tuple like `y`; the model chooses the other fields.
     """
+
+
+@hook(optional=True)
+def at_once(scene, y, forcing, now):
+    """Inspection `now` of a state, as the contacts that can stay closed leave it if not all can.
+
+    Parameters
+    ----------
+    scene, y, forcing
+        As for :func:`inspect`.
+    now : NamedTuple
+        What :func:`inspect` returned.
+
+    Returns
+    -------
+    NamedTuple
+        By default `now`.
+    """
+    return now
 
 
 @hook(absorb=True, optional=True)

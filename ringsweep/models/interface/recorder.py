@@ -6,8 +6,8 @@ functions ``constant_step.seen``, ``series.seen_at`` and ``implicit.seen`` make 
 
 Who calls: ``automaton.py``, ``taylor.py``, ``creep.py`` and ``rk4.py`` of the solvers. ``begin`` once at launch,
 ``observe`` after each interval; ``conclude`` and ``keep_memory`` once at the end. Solvers that locate events call
-``lend`` after ``begin``, ``enter`` at the beginning of each step, ``as_mode_ends`` at each event, ``after_event`` after
-it, and ``at_jam`` after a jam.
+``at_once`` before ``begin`` if a run ends at launch, ``lend`` after it, ``enter`` at the beginning of each step,
+``as_mode_ends`` at each event, ``after_event`` after it, and ``at_jam`` after a jam.
 """
 
 from __future__ import annotations
@@ -164,6 +164,31 @@ def at_jam(scene, record, normals, velocity):
         By default `record`.
     """
     return record
+
+
+@hook(optional=True)
+def at_once(scene, status, mode, t, y, seen):
+    """What :func:`begin` takes of a run that ends at launch: the mode in which it would begin does not exist.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and what :func:`ringsweep.models.interface.modes.begin` returned as its mode.
+    status : int
+        How the run ends, a constant of :mod:`ringsweep.models.interface.status`.
+    t : Instant
+        Time, s.
+    y : tuple of float
+        State.
+    seen : tuple of float
+        The state as the recorder takes it, by the equations of the mode.
+
+    Returns
+    -------
+    tuple of float
+        By default `seen`.
+    """
+    return seen
 
 
 @hook(optional=True)

@@ -16,7 +16,7 @@ from math import sqrt
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.inspection import slip_in_space
-from ringsweep.models.interface import constant_step, implicit, modes
+from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.ring.contacts import coefficients_in_slip, places_after_edge
 from ringsweep.models.ring.series import (
@@ -30,6 +30,7 @@ from ringsweep.models.ring.series import (
     held_at,
     is_jamming,
     lost_in_slip,
+    seen_in_slip_at_once,
     slipping,
     with_places,
     with_slip,
@@ -118,6 +119,12 @@ def _begin_on_bristle_ring(scene):
     if not _region_guard(scene, coefficients_in_slip(scene, mode), v, z_1, z_2, float(mode.sign), BAND) > 0.0:
         mode = with_slip(mode, mode.sign, KINETIC, -1)
     return t, y, after_jump(scene, mode, t, y), mode
+
+
+@recorder.at_once.implements(BristleRing)
+def _at_once_on_bristle_ring(scene, status, mode, t, y, seen):
+    """Implement :func:`recorder.at_once`."""
+    return seen_in_slip_at_once(scene, status, friction_and_motion(scene, mode, t, y), seen)
 
 
 @friction_and_motion.implements(BristleRing)

@@ -66,7 +66,7 @@ def _seen_in_constant_step_on_ring(scene, y, now):
 @constant_step.row.implements(Ring, BristleRing)
 def _row_of_constant_step_on_ring(scene, y, forcing):
     """Implement :func:`constant_step.row`: the same columns as :func:`modes.row` on the ring."""
-    now = constant_step.inspect(scene, y, forcing)
+    now = constant_step.at_once(scene, y, forcing, constant_step.inspect(scene, y, forcing))
     normals, places = (now.normal_1, now.normal_2), zones_of(scene, *places_at(scene, y[0] - forcing[0]))
     row = y[0], y[1], now.rates[1], *normals, forcing[1], *places, word_of_mode(scene, now)
     return *row, *y[2:]

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 from ringsweep.compile import absorbed, feature, generated, hook, inlined, replacing
 from ringsweep.models.interface import modes, recorder, series
 from ringsweep.models.interface.shock import Located
-from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
+from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
 from ringsweep.models.ring import long_run
 from ringsweep.models.ring.contacts import (
     coefficients_in_slip,
@@ -226,17 +226,23 @@ def _at_breakaway(scene, mode):
 
 
 @inlined
-def _mode_at_rest(scene, mode, t, phi, stick_end):
-    """Status and mode of a set-valued law at zero sliding velocity; see :func:`contact.at_rest` for `stick_end`."""
+def _problem_at_rest(scene, mode, t, phi):
+    """The modes of slip from rest; static coefficients under the contacts; what else :func:`contact.at_rest` takes."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     region = region_at(scene.law, 0.0)
-    motion = sin(phi), cos(phi), ring_omega
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    stick = with_slip(mode, 0, _region_of_stick(mu_s1, mu_s2, scene.body, motion, ring_epsilon), -1)
     forward = slipping(scene, mode, phi - theta, (1, region, SLOW))
     backward = slipping(scene, mode, phi - theta, (-1, region, SLOW))
     breakaway = _at_breakaway(scene, forward), _at_breakaway(scene, backward)
-    problem = *breakaway, motion, ring_epsilon
+    return (forward, backward), (mu_s1, mu_s2), (*breakaway, (sin(phi), cos(phi), ring_omega), ring_epsilon)
+
+
+@inlined
+def _mode_at_rest(scene, mode, t, phi, stick_end):
+    """Status and mode of a set-valued law at zero sliding velocity; see :func:`contact.at_rest` for `stick_end`."""
+    (forward, backward), (mu_s1, mu_s2), problem = _problem_at_rest(scene, mode, t, phi)
+    _, _, motion, ring_epsilon = problem
+    stick = with_slip(mode, 0, _region_of_stick(mu_s1, mu_s2, scene.body, motion, ring_epsilon), -1)
     found = contact.at_rest(scene.body, (mu_s1, mu_s2), *problem, stick_end)
     if found == contact.IMPOSSIBLE:
         # A contact on an edge may belong to either side.
@@ -348,6 +354,32 @@ def _loads_as_stick_ends(scene, mode, t, y, first):
     ring_omega = problem[2][2]
     normals = contact.loads_as_stick_ends(body, *problem, first)
     return normals, body.mass * (body.gravity + body.radius * ring_omega * ring_omega)
+
+
+@recorder.at_once.implements(ring.Ring)
+def _at_once_on_ring(scene, status, mode, t, y, seen):
+    """Implement :func:`recorder.at_once`: a body at rest is in the mode of stick."""
+    if mode.sign != 0:
+        return seen_in_slip_at_once(scene, status, friction_and_motion(scene, mode, t, y), seen)
+    _, static, (forward, backward, motion, epsilon) = _problem_at_rest(scene, mode, t, y[0])
+    problem = contact.at_breakaway(static, forward, backward), static, 0, motion, epsilon
+    return _seen_opened(scene, status, problem, seen)
+
+
+@inlined
+def seen_in_slip_at_once(scene, status, slip, seen):
+    """Implement :func:`recorder.at_once` in slip; `slip` is what :func:`friction_and_motion` returns."""
+    K, motion = slip
+    return _seen_opened(scene, status, (K, (0.0, 0.0), 1, motion, 0.0), seen)
+
+
+@inlined
+def _seen_opened(scene, status, problem, seen):
+    """What the recorder is shown of a body that ends at launch; `problem` is the rest of :func:`contact.opened`."""
+    opens = contact.OPEN_1 if status == SEPARATED_1 else contact.OPEN_2 if status == SEPARATED_2 else contact.OPEN_BOTH
+    closed = seen[2], seen[3], seen[4].acceleration
+    normal_1, normal_2, epsilon = contact.opened(scene.body, opens, closed, *problem)
+    return joined((seen[0], seen[1], normal_1, normal_2, Located(epsilon, seen[4].size)), seen[5:])
 
 
 @recorder.as_mode_ends.implements(ring.Ring)

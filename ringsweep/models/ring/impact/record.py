@@ -99,6 +99,12 @@ def _begin_record_with_impact(scene, t, seen):
     return Record(recorder.begin(scene.closed, t, seen[:5]), 0.0, 0.0, 0.0, nothing)
 
 
+@recorder.at_once.implements(ImpactRing)
+def _at_once_with_impact(scene, status, mode, t, y, seen):
+    """Implement :func:`recorder.at_once`: a body that jams has no reactions."""
+    return joined((seen[0], seen[1], 0.0, 0.0), seen[4:])
+
+
 @recorder.observe.implements(ImpactRing)
 def _observe_with_impact(scene, record, t, duration, stuck, seen):
     """Implement :func:`recorder.observe`.
