@@ -1,5 +1,7 @@
 """Least and greatest numbers of a run: no instant of its history exceeds them, and they are those of closed forms."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,6 +10,7 @@ from rings import course, rubs, shape
 from tiers import mostly_slow
 
 import ringsweep
+from ringsweep.models.turn import Interval, turn_within
 
 G = 9.81
 
@@ -196,3 +199,15 @@ def test_greatest_velocity_within_a_long_step_is_as_exact_as_its_end():
         for rtol in (3e-6, 1e-10)
     )
     assert abs(found.omega_max - exact.omega_max).item() < 1e-8
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("rounding", [0.0, 1e-18, -1e-18])
+def test_turn_of_a_hop_that_begins_at_rest_is_its_top(side, rounding):
+    """In one step from rest to the top and in one to the landing; the velocity at the top is rounding."""
+    course = [
+        Interval(t, 1.0, side * x, side * v) for t, x, v in ((0.0, 0.0, 0.0), (1.0, 0.5, rounding), (2.0, 0.0, -1.0))
+    ]
+    turns = [turn_within(last, now) for last, now in pairwise(course)]
+    tops = [turn.x for turn in turns if (turn.is_greatest if side > 0.0 else turn.is_least)]
+    assert side * max(tops, key=abs) == pytest.approx(0.5)

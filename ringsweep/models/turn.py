@@ -34,14 +34,17 @@ def turn_within(last, now):
     """Turn within the interval `now`, in which the velocity changes its sign. There it is nearly linear in time.
 
     A body that rests at both ends and has moved in between, from one stop to the next in one step, turned where it
-    began.
+    began. One that leaves rest and turns in one step turned at the end: its velocity there is rounding.
     """
     change = last.velocity - now.velocity
     changes = abs(change) > 0.0
     share = select(changes, last.velocity / select(changes, change, 1.0), 0.0)
+    hops = (last.velocity == 0.0) & (now.velocity * (now.x - last.x) < 0.0)
+    share = select(hops, 1.0, share)
     rests = (last.velocity == 0.0) & (now.velocity == 0.0)
     up = (last.velocity <= 0.0) & (now.velocity > 0.0) | rests & (now.x > last.x)
     down = (last.velocity > 0.0) & (now.velocity <= 0.0) | rests & (now.x < last.x)
+    down = down | (last.velocity == 0.0) & (now.velocity < 0.0)
     return Turn(now.t - (1.0 - share) * now.duration, between(last, now, share), up, down)
 
 
