@@ -594,6 +594,8 @@ class TestRefused:
              "bristles, which have no state in an impact"),
             ({"impact": {"restitution": 1.5}}, "auto", "must be at least 0 and at most 1"),
             ({"impact": {}}, "auto", "restitution: missing"),
+            ({"drive": {"law": "formula", "theta": "amplitude*abs(sin(w*t))", "w": 8.0}}, "auto",
+             "the angular velocity jumps"),
             ({"body": BODY["body"] | {"inertia": 0}}, "auto", "cannot turn on one contact"),
         ],
     )  # fmt: skip

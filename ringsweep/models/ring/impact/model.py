@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ringsweep.errors import InputError
+from ringsweep.models.parts import drive_of
 from ringsweep.models.ring import record as of_ring
 from ringsweep.models.ring.impact.record import OUTCOMES
 from ringsweep.models.ring.impact.rows import EVENT, HISTORY
@@ -53,13 +54,15 @@ class SingleContactImpact(SingleContactRing):
         for path in structure.by_direction:
             problem = "friction cannot depend on the direction of sliding beside impact: leave one of them out"
             raise InputError(f"scene.{path}", problem)
+        # First, since the drive of a ring without impact may jump.
+        drive = drive_of(structure, values)
         closed: Any = super().build(replace(structure, impact=False), values)
         balls = self.balls(values, closed.body)
         return ImpactRing(
             closed=closed,
             turned=closed._replace(body=self.turned(closed.body, balls)),
             law=closed.law,
-            drive=closed.drive,
+            drive=drive,
             span=closed.span,
             balls=balls,
             restitution=values["impact.restitution"],
