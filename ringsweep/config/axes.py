@@ -17,7 +17,7 @@ from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW, Scene, Structure
-from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.parameters import Key, Parameter
 from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import is_plain, is_quantity, other_unit, quantity, show, spelled
 from ringsweep.quantities.variables import OUTCOMES
@@ -116,7 +116,7 @@ def paths_of(key: Any) -> list[Any]:
     return [path.strip() for path in key.split(",")] if isinstance(key, str) else [key]
 
 
-def swept_parameter(known: Mapping[str, Parameter | Choice], path: object, where: str) -> Parameter | Choice:
+def swept_parameter(known: Mapping[str, Parameter | Key], path: object, where: str) -> Parameter | Key:
     """The parameter at a swept path, which must be one of the known paths."""
     if not isinstance(path, str) or path not in known:
         raise InputError(where, "the scene has no such number to vary" + laws_with(path) + suggestion(path, known))
@@ -128,7 +128,7 @@ def dimension(path: str) -> str:
     return path.replace(".", "_")
 
 
-def read_data_array(given: xr.DataArray, parameter: Parameter | Choice, where: str) -> Column:
+def read_data_array(given: xr.DataArray, parameter: Parameter | Key, where: str) -> Column:
     """Dimensions and values of a DataArray, converted from its ``units``, or from those of pint's quantities in it."""
     dims = tuple(map(str, given.dims))
     if not dims:
@@ -141,9 +141,9 @@ def read_data_array(given: xr.DataArray, parameter: Parameter | Choice, where: s
     return dims, read_values(flat, parameter, where, MAX_CELLS).reshape(given.shape)
 
 
-def read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: str) -> NDArray[np.float64]:
+def read_spacing(given: dict[str, Any], parameter: Parameter | Key, where: str) -> NDArray[np.float64]:
     """Values from ``{linspace: [first, last, count]}`` or ``{geomspace: ...}``."""
-    if isinstance(parameter, Choice):
+    if isinstance(parameter, Key):
         raise InputError(where, f"a list of names is expected, got {show(given)}")
     if len(given) != 1 or next(iter(given)) not in _SPACINGS:
         wrong = next((key for key in given if key not in _SPACINGS), None)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from ringsweep.config import neighbours, yaml_text
+from ringsweep.config import options, yaml_text
 from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
-from ringsweep.config.options import read_solver
+from ringsweep.config.options import Follow, Refinement, read_solver
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import suggestion, warn_once
 from ringsweep.config.uncertain import Sample, read_sample
@@ -21,7 +21,7 @@ from ringsweep.config.yaml_text import Document, Source, scalar
 from ringsweep.errors import InputError
 from ringsweep.models.scene import ELSEWHERE, LAW, WAYS, Scene
 from ringsweep.physics.friction.registry import SURFACE
-from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.parameters import Key, Parameter
 from ringsweep.quantities.units import is_plain, other_unit, show
 from ringsweep.quantities.variables import written
 
@@ -70,9 +70,9 @@ class Config:
     axes: Axes
     source: dict[str, Any]
     name: str
-    refine: neighbours.Refinement | None = None
+    refine: Refinement | None = None
     sample: Sample | None = None
-    follow: neighbours.Follow | None = None
+    follow: Follow | None = None
     begins_from: str | None = None
 
     @property
@@ -189,13 +189,13 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         if path.removeprefix("scene.") in swept:
             raise InputError(path, "is swept here: --set changes values that all cells share")
     laws = next(((where, given) for path, where, _, given in columns if path == LAW), None)
-    if (file := neighbours.run_to_continue(doc)) is not None:
+    if (file := options.run_to_continue(doc)) is not None:
         try:
-            neighbours.put_state(doc, parse_scene(doc, swept, laws), file, load(file), swept)
+            options.put_state(doc, parse_scene(doc, swept, laws), file, load(file), swept)
         except InputError as error:
             if file not in (error.file, error.path):
                 raise
-            raise InputError(neighbours.FROM, f"{file}: {error.problem}") from None
+            raise InputError(options.FROM, f"{file}: {error.problem}") from None
     scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = build_axes(scene, columns)
@@ -205,8 +205,8 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     if (sample := read_sample(sweep.get("sample"), scene, axes)) is None:
         check_consistency(scene, axes)
     given = tree.get("sweep", {})
-    refine = neighbours.read_refinement(given.get("refine"), axes)
-    follow = neighbours.read_follow(given.get("follow"), scene, axes)
+    refine = options.read_refinement(given.get("refine"), axes)
+    follow = options.read_follow(given.get("follow"), scene, axes)
     # A section stands beside all but cells that are inferred, and probabilities.
     section = None if refine is None and sample is None else scene.structure.section
     parts = {"sweep.refine": refine, "sweep.sample": sample, "sweep.follow": follow, "record.section": section}
@@ -217,7 +217,7 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     # Axes that a program gives are in SI units.
     _warn_of_units(scene, changed, columns if doc.columns is None and doc.locations else ())
     if follow is not None and len(follow.ways) > 1:
-        axes = Axes({**axes.sizes, neighbours.DIRECTION: len(follow.ways)}, axes.columns)
+        axes = Axes({**axes.sizes, options.DIRECTION: len(follow.ways)}, axes.columns)
     return Config(scene, solver, axes, tree, doc.file.stem, refine, sample, follow, begins_from=file)
 
 
@@ -253,7 +253,7 @@ def _apply_settings(doc: Document, settings: Iterable[Setting]) -> dict[str, tup
     return changed
 
 
-def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parameter | Choice) -> None:
+def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parameter | Key) -> None:
     """Say in which unit a number without unit is taken, if the configuration writes this number in another unit.
 
     Parameters

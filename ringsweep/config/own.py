@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ringsweep.config.sections import Key, Keys, choose, one_of, read_keys, read_values, section_of, warn_once
+from ringsweep.config.sections import Keys, choose, one_of, read_keys, read_values, section_of, warn_once
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name, shortened
 from ringsweep.models import MODELS
@@ -23,7 +23,7 @@ from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, TRAITS, add_law, laws
 from ringsweep.physics.friction.formula import FRICTION, FormulaError
 from ringsweep.physics.friction.laws import Definition, define
-from ringsweep.quantities.parameters import Choice, Parameter, declared
+from ringsweep.quantities.parameters import Key, Parameter, declared
 from ringsweep.quantities.units import show
 from ringsweep.statistics import Floats
 
@@ -117,9 +117,9 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
     return found
 
 
-def law_choice(model: str, own: Iterable[str]) -> Choice:
+def law_choice(model: str, own: Iterable[str]) -> Key:
     """Friction laws that a model takes, and those that the configuration defines."""
-    return Choice("friction law", tuple(dict.fromkeys([*MODELS[model].laws, *own, FORMULA, TABLE_LAW])))
+    return Key("friction law", dict.fromkeys([*MODELS[model].laws, *own, FORMULA, TABLE_LAW], ""))
 
 
 def read_laws(
@@ -145,7 +145,7 @@ def read_laws(
     known, names, curve = law_choice(model, own), list[str](), None
     if "law" in section:
         # Name a wrong law, rather than the parameters that only this law has.
-        names = [choose(dict.fromkeys(known.names), section, f"scene.{LAW}", f"friction law of model {model}")]
+        names = [choose(known.names, section, f"scene.{LAW}", f"friction law of model {model}")]
     if swept is not None:
         names = read_values(swept[1], known, swept[0]).tolist()
     if FORMULA in names and FORMULA not in own:

@@ -11,17 +11,16 @@ from math import pi
 from typing import Any
 
 from ringsweep.config import own
-from ringsweep.config.options import read_record
-from ringsweep.config.sections import choose, missing_text, one_of, section_of, suggestion, warn_once
+from ringsweep.config.sections import Keys, choose, missing_text, one_of, read_keys, section_of, suggestion, warn_once
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
-from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS, Scene, Structure
+from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS, Scene, Section, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.formula import NAMES
 from ringsweep.physics.friction.registry import SURFACE
-from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.parameters import Key, Parameter
 from ringsweep.quantities.units import is_plain, quantity, show
 from ringsweep.quantities.variables import written
 
@@ -38,7 +37,50 @@ _LARGEST_RATIO = 1000.0
 _LARGEST_ANGLE = 4.0 * pi
 
 
-def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
+#: Keys of the section ``record``.
+RECORD: Keys = {
+    "exponent": Key("whether a run tells its Lyapunov exponent and its Floquet multipliers", default=False),
+    "section": Key("points of the motion that a run keeps"),
+}
+
+#: Keys of ``record.section``.
+SECTION: Keys = {
+    "at": Key(
+        "instant of a section",
+        {"period": "the end of each period of force or drive", "turn": "each maximum of x, on the belt"},
+    ),
+    "keep": Parameter("1", "number of points, the last of a run", lower=1, upper=16384, default=64, whole=True),
+    "period": Parameter(
+        "s", "time between two points, where force and drive have no period", lower=0.0, open_lower=True, optional=True
+    ),
+}
+
+
+def read_record(given: Any, model: str) -> tuple[bool, Section | None]:
+    """Whether the mapping under ``record`` asks for the exponent, and the section that it asks for.
+
+    Raises
+    ------
+    InputError
+        If it is no mapping, has an unknown key or a wrong value, or if the model has no exponent or no section.
+    """
+    record = read_keys(given, RECORD, "record")
+    for key, known in (("exponent", "has_exponent"), ("section", "sections")):
+        if record[key] not in (None, False) and not getattr(MODELS[model], known):
+            others = ", ".join(name for name, other in MODELS.items() if getattr(other, known))
+            raise InputError(f"record.{key}", f"model {model} has none: it is known of model {others}; leave it out")
+    if record["section"] is None:
+        return record["exponent"], None
+    able = MODELS[model].sections
+    at = Key("instant of a section", dict.fromkeys(able, ""), example=able[0])
+    section = read_keys(record["section"], {**SECTION, "at": at}, "record.section")
+    if section["period"] is not None and section["at"] != "period":
+        problem = f"belongs to `at: period`, not to `at: {section['at']}`: leave it out"
+        raise InputError("record.section.period", problem)
+    return record["exponent"], Section(**section)
+
+
+def sweepable(scene: Scene) -> dict[str, Parameter | Key]:
     """Every path of a scene that a sweep can vary, with its parameter."""
     return {**numbers_of(scene.structures), LAW: own.law_choice(scene.structure.model, scene.structures)}
 
@@ -74,7 +116,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     names, defined, curve = own.read_laws(doc, scene, model, laws)
     moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
-    known = own.law_choice(model, defined).names
+    known = tuple(own.law_choice(model, defined).names)
     registered = MODELS[model], WITH_IMPACT.get(model), *map(LAWS.get, known), *DRIVES.values()
     keys = _keys(moved, known, tuple(defined.items()), zones or ("zones.0",), (*DRIVES, own.FORMULA), *registered)
     leaves = dict(keys.leaves(scene, names))
@@ -261,7 +303,7 @@ def _warn_of_lengths(lengths: Mapping[str, float]) -> None:
         warn_once(message, large, long, small, short)
 
 
-def warn_of_plain_angle(path: str, given: Any, parameter: Parameter | Choice) -> None:
+def warn_of_plain_angle(path: str, given: Any, parameter: Parameter | Key) -> None:
     """Warn of an angle of many turns that has no unit: it may have been meant in degrees."""
     # Other than angles without limits are refused if they are this large.
     is_angle = isinstance(parameter, Parameter) and parameter.unit == "rad" and is_plain(given)

@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
-from ringsweep.config import axes, neighbours, options, own, uncertain
-from ringsweep.config.scene import STEADY, structures_of
-from ringsweep.config.sections import Keys
+from ringsweep.config import axes, own, uncertain
+from ringsweep.config.options import Follow, Refinement
+from ringsweep.config.scene import RECORD, SECTION, STEADY, structures_of
+from ringsweep.config.sections import Keys, keys_of
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS
 from ringsweep.physics.drives import DRIVES
@@ -71,7 +72,7 @@ def schema() -> dict[str, Any]:
     scene["required"], parts["drive"]["required"] = ["model"], ["law"]
     for section, what in {"friction": "friction law", "drive": "drive", "force": "force", "load": "load"}.items():
         parts[section]["additionalProperties"] = _number(Parameter("", f"parameter of a {what} by formula"))
-    record = _section(_keys(options.RECORD, section=_section(_keys(options.SECTION), "at")))
+    record = _section(_keys(RECORD, section=_section(_keys(SECTION), "at")))
     record = {"description": "what a run records", **record}
     sections = {"scene": scene, "solver": _solver(), "record": record, "sweep": _sweep(list(known))}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "ringsweep configuration"}
@@ -155,7 +156,7 @@ def _keys(keys: Keys, **others: dict[str, Any]) -> dict[str, dict[str, Any]]:
     for name, key in keys.items():
         if isinstance(key, Parameter):
             found[name] = _number(key)
-        elif key.names is not None:
+        elif key.names:
             found[name] = _word(key.long_name, key.names)
         else:
             found[name] = {"description": key.long_name, **others.get(name, _FLAG)}
@@ -165,7 +166,7 @@ def _keys(keys: Keys, **others: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def _solver() -> dict[str, Any]:
     methods: list[dict[str, Any]] = [{"type": "string", "enum": list(METHODS)}]
     for name, about in _meanings(METHODS).items():
-        keys = {"method": {"const": name, "description": about}, **_keys(options.options_of(METHODS[name]))}
+        keys = {"method": {"const": name, "description": about}, **_keys(keys_of(METHODS[name]))}
         methods.append(_section(keys, "method"))
     return _any(*methods, description="how time advances")
 
@@ -186,12 +187,12 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     points = "CSV file whose columns are paths and whose rows are runs, or its columns"
     columns = _open("path -> values", _list(_VALUE), propertyNames=names, properties={LAW: laws})
     which = "axis along which each cell starts from the state in which the one before ended"
-    followed = _section(_keys(neighbours.FOLLOW, axis=_TEXT), "axis")
+    followed = _section(_keys(keys_of(Follow), axis=_TEXT), "axis")
     boundaries = "compute only the boundaries of the map: every 32nd cell, then where neighbours differ"
     return _section(
         {
             "grid": _open(grid, axis, propertyNames=together, properties=of_laws),
-            "refine": _any(_FLAG, _section(_keys(neighbours.REFINE)), description=boundaries),
+            "refine": _any(_FLAG, _section(_keys(keys_of(Refinement))), description=boundaries),
             "follow": _any(_TEXT, followed, description=which),
             "sample": _sample(together, axis),
             "points": _any(_TEXT, columns, description=points),
@@ -217,5 +218,5 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
         "survival": axis,
         "sensitivity": {"anyOf": [_FLAG, _section({"of": _list(_TEXT)}, "of")]},
     }
-    found = _section(_keys(uncertain.KEYS, **others), *("n", "of"))
+    found = _section(_keys({**keys_of(uncertain.Sample), **uncertain.ASKED}, **others), *("n", "of"))
     return {"description": "uncertain parameters: each cell of the grid is sampled", **found}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cache
 from itertools import islice
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError, nearest_name
-from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.parameters import Key, Parameter, declared
 from ringsweep.quantities.units import check_unit, quantity, show, spelled
 from ringsweep.quantities.variables import common_unit
 
@@ -59,7 +60,7 @@ def missing_text(path: str, parameter: Parameter) -> str:
     return f"missing: {parameter.long_name}{unit} (for example `{path.rpartition('.')[2]}: {example}`)"
 
 
-def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int = MAX_LENGTH) -> NDArray[Any]:
+def read_values(given: Any, parameter: Parameter | Key, where: str, most: int = MAX_LENGTH) -> NDArray[Any]:
     """Quantities or names from a sequence, shape ``(n,)``.
 
     Raises
@@ -75,7 +76,7 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
     if hasattr(given, "__array__"):
         array = np.asarray(given)
         if array.ndim != 1 or array.dtype.kind not in "iufOU":
-            what = "names" if isinstance(parameter, Choice) else "numbers"
+            what = "names" if isinstance(parameter, Key) else "numbers"
             raise InputError(where, f"a list of {what} is expected, got shape {array.shape} of {array.dtype}")
         ends = (array.min(), array.max()) if array.dtype.kind == "f" and array.size else (np.nan,)
         if isinstance(parameter, Parameter) and not parameter.whole and all(map(parameter.allows, ends)):
@@ -88,9 +89,9 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
         raise many
     if not given:
         raise InputError(where, "empty: give at least one value")
-    if isinstance(parameter, Choice):
-        names = parameter.names
-        return np.array([_registered(name, names, f"{where}.{i}", parameter.long_name) for i, name in enumerate(given)])
+    if isinstance(parameter, Key):
+        names, what = parameter.names, parameter.long_name
+        return np.array([_registered(name, names, f"{where}.{i}", what) for i, name in enumerate(given)])
     try:
         return np.array([quantity(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
     except InputError:
@@ -106,29 +107,18 @@ def _registered(given: object, known: Iterable[str], path: str, what: str) -> st
     return one_of(given, known, path, f"is not a {what}" + (own if nearest_name(given, known) is None else ""))
 
 
-@dataclass(frozen=True)
-class Key:
-    """A key of a section whose value is no number.
-
-    Attributes
-    ----------
-    long_name : str
-    names : mapping of str to str, optional
-        Names to choose from, and what each says; empty texts if the names tell it.
-    default : str or bool, optional
-        A default that is true or false allows nothing else.
-    example : str
-        A value, for the message about a key that is missing; without one it may be.
-    """
-
-    long_name: str
-    names: Mapping[str, str] | None = None
-    default: str | bool | None = None
-    example: str = ""
-
-
 #: What a section may hold under each of its keys. Reader and schema follow from it.
 Keys = Mapping[str, Parameter | Key]
+
+
+def keys_of(cls: Any) -> dict[str, Parameter | Key]:
+    """Keys of a section from the fields of a dataclass: what their annotations declare, and flags of a method."""
+    found, notes = dict[str, Parameter | Key](), declared(cls)
+    for one in dataclasses.fields(cls):
+        default: Any = None if one.default is dataclasses.MISSING else one.default
+        if one.name in notes or isinstance(default, bool):
+            found[one.name] = replace(notes.get(one.name, Key("whether the answer is checked")), default=default)
+    return found
 
 
 def read_keys(given: Any, keys: Keys, where: str) -> dict[str, Any]:
@@ -152,7 +142,7 @@ def read_keys(given: Any, keys: Keys, where: str) -> dict[str, Any]:
         elif isinstance(key, Parameter):
             number = quantity(value, key, path)
             value = int(number) if key.whole else number
-        elif key.names is not None:
+        elif key.names:
             value = one_of(value, key.names, path, f"is no {key.long_name}")
         elif isinstance(key.default, bool) and not isinstance(value, bool):
             raise InputError(path, f"true or false is expected, got {show(value)}")

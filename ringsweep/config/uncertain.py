@@ -7,34 +7,29 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.axes import Axes, check_consistency, paths_of, read_spacing, swept_parameter
 from ringsweep.config.scene import outcome_numbers, sweepable
-from ringsweep.config.sections import Key, Keys, check_keys, one_of, read_keys, read_values, suggestion
+from ringsweep.config.sections import Keys, check_keys, keys_of, one_of, read_keys, read_values, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
-from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.parameters import Key, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import NUMBER, is_plain, quantity, show
 from ringsweep.statistics import DISTRIBUTIONS, METHODS, distribution, saltelli, unit_points
 
-#: Keys of ``sweep.sample``.
-KEYS: Keys = {
-    "n": Parameter("1", "points of each cell", lower=2, upper=1_000_000, whole=True),
-    "seed": Parameter("1", "seed of the sample", lower=0, upper=2**53, whole=True, default=0),
-    "replicates": Parameter("1", "independent parts of the sample", lower=4, upper=64, whole=True, default=8),
-    "method": Key("method of drawing points", dict.fromkeys(METHODS, ""), METHODS[0]),
+#: Keys of ``sweep.sample`` that functions of their own read.
+ASKED: Keys = {
     "of": Key("distributions by path", example="{body.mass: {normal: [76 g, 1 %]}}"),
     "quantiles": Key("variable -> levels"),
     "survival": Key("times at which it is asked whether the contacts still hold"),
     "sensitivity": Key("Sobol indices, and of which variables beside the regimes"),
-    "keep": Key("whether the result holds the runs too", default=False),
 }
 
 # Mean and tolerance of a uniform distribution, as engineers write them.
@@ -114,15 +109,15 @@ class Sample:
     """
 
     factors: tuple[Factor, ...]
-    n: int
-    method: str
-    seed: int
-    replicates: int
+    n: Annotated[int, Parameter("1", "points of each cell", 2, 1_000_000)]
     quantiles: Mapping[str, tuple[float, ...]]
     survival: tuple[float, ...]
     sensitivity: bool
     sensitive: tuple[str, ...]
-    keep: bool
+    method: Annotated[str, Key("method of drawing points", dict.fromkeys(METHODS, ""))] = METHODS[0]
+    seed: Annotated[int, Parameter("1", "seed of the sample", 0, 2**53)] = 0
+    replicates: Annotated[int, Parameter("1", "independent parts of the sample", 4, 64)] = 8
+    keep: Annotated[bool, Key("whether the result holds the runs too")] = False
 
     @property
     def size(self) -> int:
@@ -186,7 +181,7 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     if given is None:
         return None
     where = "sweep.sample"
-    section = read_keys(given, KEYS, where)
+    section = read_keys(given, {**keys_of(Sample), **ASKED}, where)
     _check_number(section["method"], section["n"], section["replicates"])
     sensitivity, sensitive = _sensitivity(section["sensitivity"], scene, bool(section["survival"]))
     time = Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
@@ -224,7 +219,7 @@ def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
         where = f"sweep.sample.of.{key}"
         parameters = {path: swept_parameter(known, path, where) for path in paths_of(key)}
         for path, parameter in parameters.items():
-            if isinstance(parameter, Choice):
+            if isinstance(parameter, Key):
                 raise InputError(where, f"a {parameter.long_name} has no distribution: make it an axis of sweep.grid")
             if path in axes.columns:
                 raise InputError(where, "also an axis of the sweep: a path can vary in one place only")
@@ -242,7 +237,7 @@ def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
     return tuple(sorted(found, key=lambda factor: factor.over is not None))
 
 
-def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping[str, Parameter | Choice]) -> Factor:
+def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping[str, Parameter | Key]) -> Factor:
     kinds = (*DISTRIBUTIONS, "values", "file")
     if not isinstance(spec, dict):
         example = "such as `{uniform: 0.3 ± 10 %}`, or `{normal: [0.3, 10 %]}` if 10 % is a standard deviation"
@@ -267,7 +262,7 @@ def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping
     return Factor(paths, kind, _numbers(spec[kind], kind, parameter, f"{where}.{kind}"), (), over)
 
 
-def _reference(given: Any, path: str, parameter: Any, known: Mapping[str, Parameter | Choice], where: str) -> str:
+def _reference(given: Any, path: str, parameter: Any, known: Mapping[str, Parameter | Key], where: str) -> str:
     """The path that a ratio is over; the section may be left out."""
     beside = f"{path.rpartition('.')[0]}.{given}"
     full = beside if beside in known else given

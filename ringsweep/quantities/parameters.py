@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from types import MappingProxyType
 from typing import Any, get_type_hints
@@ -76,19 +76,24 @@ class Parameter(Quantity):
 
 
 @dataclass(frozen=True)
-class Choice:
-    """A parameter that is one of several names.
+class Key:
+    """A key of a configuration whose value is no number.
 
     Attributes
     ----------
     long_name : str
-        What is chosen.
-    names : tuple of str
-        Names to choose from.
+    names : mapping of str to str, optional
+        Names to choose from, and what each says; empty texts if the names tell it.
+    default : str or bool, optional
+        A default that is true or false allows nothing else.
+    example : str
+        A value, for the message about a key that is missing; without one it may be.
     """
 
     long_name: str
-    names: tuple[str, ...]
+    names: Mapping[str, str] = field(default_factory=dict)
+    default: str | bool | None = None
+    example: str = ""
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -97,11 +102,13 @@ class Choice:
 
 
 @cache
-def declared(cls: type) -> Mapping[str, Parameter]:
-    """Parameters that a class declares by ``Annotated`` fields; ``Annotated[int, ...]`` makes a whole number."""
+def declared(cls: type) -> Mapping[str, Any]:
+    """Parameters and keys that a class declares by ``Annotated`` fields; ``Annotated[int, ...]`` is a whole number."""
     found = {}
     for name, hint in get_type_hints(cls, include_extras=True).items():
         for note in getattr(hint, "__metadata__", ()):
             if isinstance(note, Parameter):
-                found[name] = replace(note, whole=True) if hint.__origin__ is int else note
+                note = replace(note, whole=note.whole or hint.__origin__ is int)
+            if isinstance(note, Parameter | Key):
+                found[name] = note
     return MappingProxyType(found)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Axes, Config, sweepable
 from ringsweep.config.axes import Indices, by_law, dimension, laws_at, values_at
-from ringsweep.config.neighbours import DIRECTION
+from ringsweep.config.options import DIRECTION
 from ringsweep.models import batch, model_of
 from ringsweep.models.model import Continues
 from ringsweep.models.scene import Scene, Structure

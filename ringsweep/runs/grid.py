@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config
-from ringsweep.config.neighbours import BOTH, DIRECTION
+from ringsweep.config.options import BOTH, DIRECTION
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import OUTCOMES, Variable
@@ -145,6 +145,6 @@ class Chains(Grid):
         """Coordinates of the dataset."""
         found = super().coordinates()
         if DIRECTION in self.config.axes.sizes:
-            about = {"long_name": f"direction in which {self.asked.path} is followed"}
+            about = {"long_name": f"direction in which {self.asked.axis} is followed"}
             found[DIRECTION] = DIRECTION, list(BOTH), about
         return found

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ringsweep.config import Config, as_named, load, sweepable, tell_unit, with_values, yaml_text
 from ringsweep.config.axes import Axes, dimension, sweep_section, swept_parameter, swept_paths
 from ringsweep.errors import InputError
-from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.parameters import Key, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import check_unit, quantity, show, spelled
 from ringsweep.quantities.variables import QUANTILE_ENDS, common_unit, in_unit, words, written_unit, written_values
@@ -261,7 +261,7 @@ def distribution(
 def interval(whole: Config, path: str, between: Any, *forms: tuple[str, str]) -> tuple[float, float]:
     """Ends of an interval in SI units: as given, or those of the sweep; `forms` are options as for `tell_unit`."""
     parameter = swept_parameter(sweepable(whole.scene), path, "path")
-    if isinstance(parameter, Choice) or parameter.whole:
+    if isinstance(parameter, Key) or parameter.whole:
         raise InputError("path", f"{path} is no number that varies continuously: there is nothing to halve")
     try:
         low, high = (None, None) if between is None else between
