@@ -9,32 +9,18 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ringsweep.config.own import friction_law
-    from ringsweep.errors import InputError
-    from ringsweep.quantities.variables import words
-    from ringsweep.runs.attractors import attractors
-    from ringsweep.runs.boundaries import boundary
-    from ringsweep.runs.fit import fit
-    from ringsweep.runs.precision import precision
-    from ringsweep.runs.simulate import simulate
-    from ringsweep.runs.sweep import run, sweep
-    from ringsweep.runs.thresholds import threshold
-    from ringsweep.storage.netcdf import verify
-
-__all__ = [
-    "InputError",
-    "attractors",
-    "boundary",
-    "fit",
-    "friction_law",
-    "precision",
-    "run",
-    "simulate",
-    "sweep",
-    "threshold",
-    "verify",
-    "words",
-]
+    from ringsweep.config.own import friction_law as friction_law
+    from ringsweep.errors import InputError as InputError
+    from ringsweep.quantities.variables import words as words
+    from ringsweep.runs.attractors import attractors as attractors
+    from ringsweep.runs.boundaries import boundary as boundary
+    from ringsweep.runs.fit import fit as fit
+    from ringsweep.runs.precision import precision as precision
+    from ringsweep.runs.simulate import simulate as simulate
+    from ringsweep.runs.sweep import run as run
+    from ringsweep.runs.sweep import sweep as sweep
+    from ringsweep.runs.thresholds import threshold as threshold
+    from ringsweep.storage.netcdf import verify as verify
 
 _MODULES = {
     "run": "runs.sweep",
@@ -50,6 +36,8 @@ _MODULES = {
     "words": "quantities.variables",
     "InputError": "errors",
 }
+
+__all__ = sorted(_MODULES)
 
 
 def __getattr__(name: str) -> Any:

@@ -7,55 +7,35 @@ there is no global state. A function with an argument ``ax`` draws one picture i
 ``style`` chooses another look.
 """
 
-from __future__ import annotations
+import inspect
 
-from ringsweep.plots.films import animation, save_animation
-from ringsweep.plots.fits import fit
-from ringsweep.plots.histories import history, history_panel
-from ringsweep.plots.look import REGIME_COLOURS, style
-from ringsweep.plots.maps import map_panel, regime_map
-from ringsweep.plots.page import save_page
-from ringsweep.plots.phase import friction_loop, phase_portrait
-from ringsweep.plots.polar import polar_view
-from ringsweep.plots.precision import precision_panel, work_precision
-from ringsweep.plots.probability import probability_panel, sensitivity_panel, survival_panel
-from ringsweep.plots.saving import SUFFIXES, save
-from ringsweep.plots.sections import (
-    bifurcation,
-    bifurcation_panel,
-    exponent_panel,
-    multiplier_circle,
-    multiplier_panel,
-    section_panel,
-)
-from ringsweep.plots.selection import cell
+from ringsweep.plots.films import animation as animation
+from ringsweep.plots.films import save_animation as save_animation
+from ringsweep.plots.fits import fit as fit
+from ringsweep.plots.histories import history as history
+from ringsweep.plots.histories import history_panel as history_panel
+from ringsweep.plots.look import REGIME_COLOURS as REGIME_COLOURS
+from ringsweep.plots.look import style as style
+from ringsweep.plots.maps import map_panel as map_panel
+from ringsweep.plots.maps import regime_map as regime_map
+from ringsweep.plots.page import save_page as save_page
+from ringsweep.plots.phase import friction_loop as friction_loop
+from ringsweep.plots.phase import phase_portrait as phase_portrait
+from ringsweep.plots.polar import polar_view as polar_view
+from ringsweep.plots.precision import precision_panel as precision_panel
+from ringsweep.plots.precision import work_precision as work_precision
+from ringsweep.plots.probability import probability_panel as probability_panel
+from ringsweep.plots.probability import sensitivity_panel as sensitivity_panel
+from ringsweep.plots.probability import survival_panel as survival_panel
+from ringsweep.plots.saving import SUFFIXES as SUFFIXES
+from ringsweep.plots.saving import save as save
+from ringsweep.plots.sections import bifurcation as bifurcation
+from ringsweep.plots.sections import bifurcation_panel as bifurcation_panel
+from ringsweep.plots.sections import exponent_panel as exponent_panel
+from ringsweep.plots.sections import multiplier_circle as multiplier_circle
+from ringsweep.plots.sections import multiplier_panel as multiplier_panel
+from ringsweep.plots.sections import section_panel as section_panel
+from ringsweep.plots.selection import cell as cell
 
-__all__ = [
-    "REGIME_COLOURS",
-    "SUFFIXES",
-    "animation",
-    "bifurcation",
-    "bifurcation_panel",
-    "cell",
-    "exponent_panel",
-    "fit",
-    "friction_loop",
-    "history",
-    "history_panel",
-    "map_panel",
-    "multiplier_circle",
-    "multiplier_panel",
-    "phase_portrait",
-    "polar_view",
-    "precision_panel",
-    "probability_panel",
-    "regime_map",
-    "save",
-    "save_animation",
-    "save_page",
-    "section_panel",
-    "sensitivity_panel",
-    "style",
-    "survival_panel",
-    "work_precision",
-]
+# All that is imported above.
+__all__ = sorted(name for name, part in globals().items() if name[0] != "_" and not inspect.ismodule(part))
