@@ -123,10 +123,8 @@ def draw_plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     if arguments.word is not None and kind != "sensitivity":
         raise InputError("--word", "is that of --kind sensitivity")
     target = _picture_of(dataset, arguments.output, kind, arguments.law, *map(_name_part, arguments.sel))
-    if mark == "residual":
-        save(plots.fit(result), target)
-    elif mark == "contender":
-        save(plots.work_precision(result), target)
+    if mark in ("residual", "contender"):
+        save((plots.fit if mark == "residual" else plots.work_precision)(result), target)
     elif mark == "probability":
         selection = dict(map(selection_of, arguments.sel))
         if kind in (None, "probability"):

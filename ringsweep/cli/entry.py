@@ -142,8 +142,7 @@ def _warnings_in_one_line() -> Iterator[None]:
 
 
 def _fail(message: str, status: int, error: BaseException) -> int:
-    notes = getattr(error, "__notes__", [])
-    print_error("; ".join([message, *notes]))
+    print_error("; ".join([message, *getattr(error, "__notes__", [])]))
     return status
 
 

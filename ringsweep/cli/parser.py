@@ -38,13 +38,11 @@ def build_parser() -> argparse.ArgumentParser:
 
     run = _add_command(entries, commands.run_command, "config CONFIG.yaml", "or OUT.nc, whose sweep is repeated")
     _option(run, "-o --output OUT.nc", "default: the configuration's name, in this folder")
-    _option(run, *_SET, **_LIST)
-    _option(run, *_JOBS, type=_COUNT)
+    _options(run, _SET, _JOBS, _JSON)
     _option(run, "--dry-run", "estimate memory, disk space and time; write nothing")
     _option(run, "--fresh", "start over: discard what an earlier run computed")
     _option(run, "--reuse OLD.nc", "take cells that this earlier sweep has too")
     _option(run, "--refine", "compute only the boundaries, audit the rest (see sweep.refine)")
-    _option(run, *_JSON)
     _option(run, "--backend", "what computes (default: threads of this machine)", choices=["threads", "dask"])
     _option(run, "--scheduler ADDRESS", "address of a Dask scheduler, such as tcp://host:8786")
 
@@ -71,9 +69,7 @@ def build_parser() -> argparse.ArgumentParser:
     _option(threshold, "--unit U", "unit of the answer: rpm (default: as the ends or the file have it)")
     _option(threshold, "--scan N", "runs in which changes of regime are looked for (default: 128)", type=_COUNT)
     _option(threshold, "-o --output OUT.nc", "write the thresholds too (default: only print them)")
-    _option(threshold, *_JSON)
-    _option(threshold, *_JOBS, type=_COUNT)
-    _option(threshold, *_SET, **_LIST)
+    _options(threshold, _JSON, _JOBS, _SET)
 
     fit = _add_command(entries, commands.fit_command, "config CONFIG.yaml", "or OUT.nc, whose scene is fitted")
     _option(fit, "--data RUN.csv", "the measured history", required=True)
@@ -81,12 +77,11 @@ def build_parser() -> argparse.ArgumentParser:
     _option(fit, "-o --output FIT.nc", "default: the configuration's name with -fit")
     _option(fit, "--start N", "minimisations, each from its start (default: 8)", type=_COUNT, default=8)
     _option(fit, "--noise S", "standard deviation of a measurement (default: by the residuals)")
-    _option(fit, *_SET, **_LIST)
+    _options(fit, _SET)
 
     simulate = _add_command(entries, commands.simulate_command, "config CONFIG.yaml", "or OUT.nc, whose scene is run")
     _option(simulate, "-o --output RUN.nc", "default: the configuration's name with -run")
-    _option(simulate, *_SET, **_LIST)
-    _option(simulate, *_SEL, **_LIST)
+    _options(simulate, _SET, _SEL)
 
     stored = "what ringsweep simulate or precision wrote, or a sampled sweep"
     plot = _add_command(entries, commands.plot_command, "dataset RUN.nc", stored)
@@ -102,8 +97,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     animate = _add_command(entries, commands.animate_command, "config CONFIG.yaml", "or OUT.nc, whose scene is run")
     _option(animate, "-o --output RUN.gif", "default: the configuration's name with -run; .mp4 and .html too")
-    _option(animate, *_SET, **_LIST)
-    _option(animate, *_SEL, **_LIST)
+    _options(animate, _SET, _SEL)
 
     taken = "or OUT.nc, whose sweep is taken"
     precision = _add_command(entries, commands.precision_command, "config CONFIG.yaml", taken)
@@ -115,7 +109,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     info = _add_command(entries, commands.info_command, "dataset OUT.nc")
     _option(info, "--sel DIM=VALUE", "only the cells whose coordinate is nearest to VALUE; units allowed", **_LIST)
-    _option(info, *_JSON)
+    _options(info, _JSON)
     _option(info, "--cite", "print only what a paper that uses it can cite")
 
     _add_command(entries, commands.verify_command, "files FILE.nc", nargs="+")
@@ -175,11 +169,9 @@ def _add_command(entries: Any, function: Any, argument: str = "", about: str | N
 def _add_verbosity(parser: argparse.ArgumentParser) -> None:
     """Options that may stand before and after the command; without a default the one does not reset the other."""
     verbosity = parser.add_mutually_exclusive_group()
-    for letter, name, summary in (
-        ("-q", "--quiet", "print only warnings and errors"),
-        ("-v", "--verbose", "print more, with the traceback of an unexpected error"),
-    ):
-        verbosity.add_argument(letter, name, action="store_true", default=argparse.SUPPRESS, help=summary)
+    more = "print more, with the traceback of an unexpected error"
+    _option(verbosity, "-q --quiet", "print only warnings and errors", default=argparse.SUPPRESS)
+    _option(verbosity, "-v --verbose", more, default=argparse.SUPPRESS)
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:
@@ -188,17 +180,7 @@ def _formatter(prog: str) -> argparse.HelpFormatter:
     )
 
 
-# Options that several commands have.
-_SET = "--set PATH=VALUE", "change a value: drive.amplitude=3"
-_SEL = "--sel DIM=VALUE", "run the cell of OUT.nc nearest to VALUE; units allowed"
-_JSON = "--json", "print JSON in place of text"
-_JOBS = "--jobs N", "threads (default: all cores)"
-
-# Of an option that may be repeated.
-_LIST: dict[str, Any] = {"action": "append", "default": []}
-
-
-def _option(parser: argparse.ArgumentParser, spelling: str, summary: str, **more: Any) -> None:
+def _option(parser: Any, spelling: str, summary: str, **more: Any) -> None:
     """Add an option: its names, and what its value is called, if it has one that is no choice."""
     names = [word for word in spelling.split() if word.startswith("-")]
     value = spelling.removeprefix(" ".join(names)).strip()
@@ -207,6 +189,12 @@ def _option(parser: argparse.ArgumentParser, spelling: str, summary: str, **more
     if value:
         more["metavar"] = value
     parser.add_argument(*names, help=summary, **more)
+
+
+def _options(parser: Any, *shared: tuple[str, str, dict[str, Any]]) -> None:
+    """Add options that several commands have."""
+    for spelling, summary, more in shared:
+        _option(parser, spelling, summary, **more)
 
 
 class _Version(argparse.Action):
@@ -253,3 +241,12 @@ def _number(name: str = "the number", unit: str = "1", **interval: Any) -> Calla
 _COUNT = _number(lower=1, upper=10**9, whole=True)
 _POSITIVE = _number(lower=0, open_lower=True)
 _TIME = _number("the time", "s")
+
+# Of an option that may be repeated.
+_LIST: dict[str, Any] = {"action": "append", "default": []}
+
+# Options that several commands have.
+_SET = "--set PATH=VALUE", "change a value: drive.amplitude=3", _LIST
+_SEL = "--sel DIM=VALUE", "run the cell of OUT.nc nearest to VALUE; units allowed", _LIST
+_JSON = "--json", "print JSON in place of text", dict[str, Any]()
+_JOBS = "--jobs N", "threads (default: all cores)", {"type": _COUNT}

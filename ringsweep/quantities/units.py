@@ -25,6 +25,9 @@ _UNIT = re.compile(rf"(?:1\s*/\s*)?{_WORD}(?:(?:\s*[*/·]\s*|\s+){_WORD})*")
 # Longest text, in characters, that can be a number with a unit.
 _LONGEST = 100
 
+# Simple multiples of pi, as messages write them.
+_OF_PI = {0.5: "pi/2", 1.0: "pi", 2.0: "2 pi"}
+
 #: Integers from here on are no values of a configuration.
 LONG_INTEGER = 10**_LONGEST
 
@@ -56,7 +59,8 @@ def quantity(value: Any, parameter: Parameter, path: str) -> float:
     unit = after_number(parameter.unit)
     plain = not isinstance(value, str) or is_plain(value)
     if plain and parameter.unit == "rad" and abs(number) > parameter.upper > 0.0:
-        raise InputError(path, f"{number:g} rad is beyond {_in_pi(parameter.upper)}: was `{number:g} deg` meant?")
+        end = _OF_PI.get(parameter.upper / math.pi, f"{parameter.upper:g}")
+        raise InputError(path, f"{number:g} rad is beyond {end}: was `{number:g} deg` meant?")
     shown = f"{number:g}{unit}" if plain else f"{show(value)} ({number:g}{unit})"
     raise InputError(path, f"{shown} is not allowed: {parameter.long_name} must be {parameter.interval}{unit}")
 
@@ -259,9 +263,3 @@ def _pint() -> Any:
 @cache
 def _registry() -> Any:
     return _pint().UnitRegistry(Path(__file__).with_name("units.txt").read_text(encoding="utf-8").splitlines())
-
-
-def _in_pi(angle: float) -> str:
-    """An angle, as a simple multiple of pi if it is one."""
-    names = {0.5: "pi/2", 1.0: "pi", 2.0: "2 pi"}
-    return names.get(angle / math.pi, f"{angle:g}")

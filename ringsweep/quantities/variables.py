@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -140,31 +141,14 @@ OUTCOMES: dict[str, Variable] = {
     "separating_contact": classes("contact that separates", CONTACTS),
     "t_separation": Variable("s", "time of separation"),
     "t_end": Variable("s", "time at which the run ends"),
-    "phi_end": Variable("rad", "angle of the body at the end"),
-    "omega_end": Variable("rad/s", "angular velocity of the body at the end"),
-    "phi_min": Variable("rad", "least angle of the body"),
-    "phi_max": Variable("rad", "greatest angle of the body"),
-    "omega_min": Variable("rad/s", "least angular velocity of the body"),
-    "omega_max": Variable("rad/s", "greatest angular velocity of the body"),
     "reversals": Variable("1", "reversals of the motion", dtype="int32"),
     "turns": Variable("1", "full turns since the last reversal or the start", dtype="int32"),
     "stick_time": Variable("s", "time for which the body sticks to the ring or belt"),
-    "normal_min_1": Variable("N", "least normal reaction at contact 1"),
-    "normal_min_2": Variable("N", "least normal reaction at contact 2"),
-    "normal_max_1": Variable("N", "greatest normal reaction at contact 1"),
-    "normal_max_2": Variable("N", "greatest normal reaction at contact 2"),
-    "x_end": Variable("m", "displacement of the body at the end"),
-    "velocity_end": Variable("m/s", "velocity of the body at the end"),
-    "deflection_end": Variable("m", "deflection of the bristles at the end"),
-    "contact_age_end": Variable("s", "age of the contacts at the end"),
     "started_from": classes(
         "state from which the run started",
         ("initial", "end_of_the_cell_before"),
         "a chain starts from `initial`, and again after a run that failed or ended before its span",
     ),
-    "x_min": Variable("m", "least displacement of the body"),
-    "x_max": Variable("m", "greatest displacement of the body"),
-    "velocity_max": Variable("m/s", "greatest velocity of the body"),
     "slips": Variable("1", "slips that follow a stick", dtype="int32"),
     "first_slip": Variable("s", "time at which the first slip begins"),
     "period": Variable("s", "time in which the motion returns"),
@@ -221,6 +205,16 @@ OUTCOMES: dict[str, Variable] = {
     "level": Variable("1", "halvings of the blocks of the map around the cell", dtype="int8"),
 }
 
+# Ends and extremes of what histories show.
+for _part, _what, _shown in (
+    ("end", "{} at the end", ("phi", "omega", "x", "velocity", "deflection", "contact_age")),
+    ("min", "least {}", ("phi", "omega", "x", "normal_1", "normal_2")),
+    ("max", "greatest {}", ("phi", "omega", "x", "velocity", "normal_1", "normal_2")),
+):
+    for _name in _shown:
+        _long = _what.format(HISTORY[_name].long_name)
+        OUTCOMES[re.sub(r"(_[12])?$", rf"_{_part}\1", _name, count=1)] = replace(HISTORY[_name], long_name=_long)
+
 #: Masses of a pair on a belt. The numbers of mass 1 are those of a belt, with ``_1`` after their names.
 MASSES = (1, 2)
 
@@ -251,23 +245,18 @@ LABELS = ("regime", "motion", "separating_contact", "aftermath")
 #: Value in files where a whole number is missing, because its cell is inferred.
 MISSING = -1
 
-# Bounds on errors: two digits are enough.
-OUTCOMES |= {
-    f"{name}_error": replace(
-        OUTCOMES[name], long_name=f"bound on the error: {OUTCOMES[name].long_name}", dtype="float32"
-    )
-    for name in (
-        *("t_separation", "t_end", "phi_end", "omega_end", "phi_min", "phi_max", "omega_min", "omega_max"),
-        *("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "period"),
-        *("open_time", "flight_time", "gap_max", "impact_speed_max", "impulse_max", "impact_loss", "t_recovered"),
-        *("normal_min_1", "normal_min_2", "normal_max_1", "normal_max_2", "force_max", "jump_max"),
-        *(
-            f"{name}_{i}"
-            for i in MASSES
-            for name in ("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "period", "force_max", "jump_max")
-        ),
-    )
-}
+# Outcomes that have a bound on their error.
+_BOUNDED = (
+    *("t_separation", "t_end", "phi_end", "omega_end", "phi_min", "phi_max", "omega_min", "omega_max"),
+    *("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "period"),
+    *("open_time", "flight_time", "gap_max", "impact_speed_max", "impulse_max", "impact_loss", "t_recovered"),
+    *("normal_min_1", "normal_min_2", "normal_max_1", "normal_max_2", "force_max", "jump_max"),
+)
+
+for _name in (*_BOUNDED, *(f"{name}_{i}" for i in MASSES for name in _ON_BELT if name in _BOUNDED)):
+    _long = f"bound on the error: {OUTCOMES[_name].long_name}"
+    # Two digits are enough.
+    OUTCOMES[f"{_name}_error"] = replace(OUTCOMES[_name], long_name=_long, dtype="float32")
 
 
 def error_attribute(name: str, columns: Collection[str]) -> dict[str, str]:

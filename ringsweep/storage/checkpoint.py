@@ -253,9 +253,7 @@ class Checkpoint:
         for path in [*self.working_folder.finished_cells(), self.folder / MANIFEST]:
             path.unlink(missing_ok=True)
         self.working_folder.remove_temporary()
-        self.files.clear()
-        self._held = None
-        self.done[:] = False
+        self.scan()
 
 
 def another_sweep(path: str, problem: str, changes: str) -> InputError:

@@ -43,15 +43,15 @@ class Layout:
     @cached_property
     def _chunks(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
         """First index and shape of each chunk, both ``(chunks, dimensions)``, and the position of its first cell."""
-        firsts = [np.arange(0, size, edge) for size, edge in zip(self.sizes, self.chunk, strict=True)]
+        # A single cell is one along a dimension that no caller sees.
+        sizes, chunk = self.sizes or (1,), self.chunk or (1,)
+        firsts = [np.arange(0, size, edge) for size, edge in zip(sizes, chunk, strict=True)]
         origins = np.stack(np.meshgrid(*firsts, indexing="ij"), axis=-1).reshape(-1, len(firsts))
-        shapes = np.minimum(np.array(self.sizes, dtype=np.intp) - origins, self.chunk)
+        shapes = np.minimum(np.array(sizes, dtype=np.intp) - origins, chunk)
         return origins, shapes, np.cumsum(shapes.prod(axis=1)) - shapes.prod(axis=1)
 
     def indices(self, positions: NDArray[np.integer]) -> tuple[NDArray[np.intp], ...]:
         """Index along each dimension of the cells at these positions, each of shape ``(len(positions),)``."""
-        if not self.sizes:
-            return ()
         origins, shapes, starts = self._chunks
         which = np.searchsorted(starts, positions, side="right") - 1
         rest = positions - starts[which]
@@ -75,11 +75,8 @@ class Layout:
 
     def chunks(self) -> Iterator[tuple[int, int, tuple[slice, ...]]]:
         """First position, last position plus one, and slices in the grid of every chunk, in order."""
-        if not self.sizes:
-            yield 0, 1, ()
-            return
         for origin, shape, start in zip(*self._chunks, strict=True):
-            region = tuple(slice(int(o), int(o + n)) for o, n in zip(origin, shape, strict=True))
+            region = tuple(slice(int(o), int(o + n)) for o, n, _ in zip(origin, shape, self.sizes, strict=False))
             yield int(start), int(start + shape.prod()), region
 
 

@@ -6,7 +6,6 @@ import hashlib
 import json
 import math
 import os
-import stat
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -316,12 +315,11 @@ def verify(path: str | os.PathLike[str]) -> None:
 
 def _check_exists(path: str | os.PathLike[str]) -> None:
     try:
-        kind = Path(path).stat().st_mode
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(str(path), "does not exist") from None
-    except (OSError, ValueError) as error:
-        raise InputError(str(path), f"cannot be read: {getattr(error, 'strerror', error)}") from error
-    if not stat.S_ISREG(kind):
+        if not Path(path).exists():
+            raise InputError(str(path), "does not exist")
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}") from error
+    if not Path(path).is_file():
         raise InputError(str(path), "is not a file")
     if Path(path).suffix.lower() in (".yaml", ".yml"):
         raise InputError(str(path), f"is a configuration, not a result: `ringsweep run {path}` writes one")
