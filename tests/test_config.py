@@ -23,7 +23,7 @@ from rings import TYPED as TEXT
 
 import ringsweep
 from ringsweep.config import load, with_values
-from ringsweep.config.axes import read_spacing
+from ringsweep.config.axes import read_axis
 from ringsweep.config.schema import _number, schema
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.quantities.parameters import Parameter, declared
@@ -769,9 +769,9 @@ def test_whole_parameter_refuses_fractions_and_is_an_integer_in_the_schema():
     assert declared(RK4)["steps"].whole
     assert quantity("3", whole, "path") == 3.0
     assert "2.5 is not a whole number: seed must be one" in refusal(quantity, 2.5, whole, "path").problem
-    assert read_spacing({"linspace": [0, 9, 4]}, whole, "axis").tolist() == [0.0, 3.0, 6.0, 9.0]
-    error = refusal(read_spacing, {"linspace": [0, 9, 3]}, whole, "axis")
-    assert "makes 4.5, but seed must be a whole number" in error.problem
+    assert read_axis({"linspace": [0, 9, 4]}, whole, "axis").tolist() == [0.0, 3.0, 6.0, 9.0]
+    error = refusal(read_axis, {"linspace": [0, 9, 3]}, whole, "axis")
+    assert "4.5 is not a whole number: seed must be one" in error.problem
     assert _number(whole)["anyOf"][0]["type"] == "integer"
     assert _number(Parameter("1", "seed"))["anyOf"][0]["type"] == "number"
 

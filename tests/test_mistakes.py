@@ -98,7 +98,11 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"of": {"friction.mu_s": {"file": "other.csv"}}}, f"{OF}.file", "no column friction.mu_s (known: mu_s, other)"),
     ({"of": {"friction.mu_s": {"file": "hole.csv"}}}, OF, "hole.csv, line 3: "),
     ({"of": {"friction.mu_s": {"file": "empty.csv"}}}, OF, "the file is empty"),
-    ({"of": {"friction.mu_s": {"over": "mu_j", "uniform": [1, 2]}}}, f"{OF}.over", "'mu_j' is no number of the scene;"),
+    (
+        {"of": {"friction.mu_s": {"over": "mu_j", "uniform": [1, 2]}}},
+        f"{OF}.over",
+        "no such number to vary; did you mean `fric",
+    ),
     ({"of": {"body.mass": {"normal": [1, 0.5]}}}, "sweep.sample.of.body.mass", "normal(1, 0.5) has probability 0.023"),
     (
         {"of": {"friction.mu_k": {"uniform": [0.1, 0.2]}}},

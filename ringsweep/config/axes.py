@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 COUNT = Parameter("1", "number of values", lower=1, upper=MAX_LENGTH, whole=True)
 
-_SPACINGS = ("linspace", "geomspace")
+_SPACINGS: dict[str, Any] = {"linspace": np.linspace, "geomspace": np.geomspace}
 
 # Cells that are checked at once: many zones over many points must not fill the memory.
 _CELLS_AT_ONCE = 4096
@@ -141,8 +141,10 @@ def read_data_array(given: xr.DataArray, parameter: Parameter | Key, where: str)
     return dims, read_values(flat, parameter, where, MAX_CELLS).reshape(given.shape)
 
 
-def read_spacing(given: dict[str, Any], parameter: Parameter | Key, where: str) -> NDArray[np.float64]:
-    """Values from ``{linspace: [first, last, count]}`` or ``{geomspace: ...}``."""
+def read_axis(given: Any, parameter: Parameter | Key, where: str) -> NDArray[Any]:
+    """Values from a list, from ``{linspace: [first, last, count]}`` or from ``{geomspace: ...}``."""
+    if not isinstance(given, dict):
+        return read_values(given, parameter, where)
     if isinstance(parameter, Key):
         raise InputError(where, f"a list of names is expected, got {show(given)}")
     if len(given) != 1 or next(iter(given)) not in _SPACINGS:
@@ -164,14 +166,7 @@ def read_spacing(given: dict[str, Any], parameter: Parameter | Key, where: str) 
     if kind == "geomspace" and min(first, last) <= 0.0:
         raise InputError(where, f"both ends of geomspace must be greater than 0, got {first:g} and {last:g}")
     with np.errstate(over="ignore", invalid="ignore"):
-        values = np.linspace(first, last, count) if kind == "linspace" else np.geomspace(first, last, count)
-    if not np.isfinite(values).all():
-        raise InputError(where, f"{first:g} and {last:g} are too far apart: the values between them overflow")
-    if parameter.whole:
-        for value in values[values % 1.0 != 0.0][:1]:
-            problem = f"makes {value:g}, but {parameter.long_name} must be a whole number: list the values"
-            raise InputError(where, problem)
-    return values
+        return read_values(_SPACINGS[kind](first, last, count), parameter, where)
 
 
 def build_axes(scene: Scene, columns: Iterable[Given]) -> Axes:
@@ -189,8 +184,7 @@ def build_axes(scene: Scene, columns: Iterable[Given]) -> Axes:
         if hasattr(given, "dims"):
             dims, values = read_data_array(given, parameter, where)
         else:
-            read = read_spacing if isinstance(given, dict) else read_values
-            dims, values = (dimension(along),), read(given, parameter, where)
+            dims, values = (dimension(along),), read_axis(given, parameter, where)
         if path in found.columns:
             also = "a column of sweep.points" if "point" in found.columns[path][0] else "on this or another axis"
             raise InputError(where, f"also {also}: a path can vary in one place only")
@@ -226,19 +220,12 @@ def values_at(scene: Scene, axes: Axes, indices: Indices, count: int) -> dict[st
     return values
 
 
-def laws_at(scene: Scene, axes: Axes, indices: Indices, count: int) -> NDArray[np.str_]:
-    """Names of the friction laws in `count` cells, shape ``(count,)``."""
-    if LAW not in axes.columns:
-        return np.full(count, scene.structure.law)
-    dims, names = axes.columns[LAW]
-    return np.asarray(names[tuple(indices[dim] for dim in dims)])
-
-
 def by_law(
     scene: Scene, axes: Axes, indices: Indices, count: int
 ) -> Iterator[tuple[Structure, NDArray[np.intp], dict[str, NDArray[np.float64]]]]:
     """Which of `count` cells have each friction law, and their values: a batch has one law, as kernels have."""
-    laws = laws_at(scene, axes, indices, count)
+    dims, names = axes.columns.get(LAW, ((), np.array(scene.structure.law)))
+    laws = np.broadcast_to(names[tuple(indices[dim] for dim in dims)], count)
     for law, structure in scene.structures.items():
         own = np.flatnonzero(laws == law)
         if len(own):

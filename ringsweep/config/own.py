@@ -312,11 +312,10 @@ def read_table(doc: Document, given: dict[str, Any], section: str, least: int) -
         found = doc.inline_csv(given["file"], f"{where}.file", where, t="time")
         if set(found) != set(columns):
             names = ["t" if name == "time" else name for name in columns]
-            missing = [name for name in columns if name not in found]
-            wrong = {name: nearest_name(name, missing) for name in found if name not in columns}
-            hints = [f"; did you mean `{near}` by {shortened(name, 40)}?" for name, near in wrong.items() if near]
-            problem = f"columns {', '.join(names)} are expected; got {', '.join(found)}{''.join(hints[:1])}"
-            raise InputError(f"{where}.file", problem)
+            wrong = next((name for name in found if name not in columns), "")
+            near = nearest_name(wrong, [name for name in columns if name not in found])
+            hint = f"; did you mean `{near}` by {shortened(wrong, 40)}?" if near else ""
+            raise InputError(f"{where}.file", f"columns {', '.join(names)} are expected; got {', '.join(found)}{hint}")
         del given["file"]
         given |= found
     for name in columns:

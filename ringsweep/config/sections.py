@@ -7,7 +7,6 @@ import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -68,27 +67,22 @@ def read_values(given: Any, parameter: Parameter | Key, where: str, most: int = 
     InputError
         If `given` is no such sequence, has more than `most` values, or one of its values is wrong.
     """
-    many = InputError(where, f"more than {most} values are too many")
-    # The size of an array is known before its values are made.
-    if isinstance(size := getattr(given, "size", 0), int) and size > most:
-        raise many
     given = spelled(given)
     if hasattr(given, "__array__"):
-        array = np.asarray(given)
-        if array.ndim != 1 or array.dtype.kind not in "iufOU":
+        given = np.asarray(given)
+        if given.ndim != 1 or given.dtype.kind not in "iufOU":
             what = "names" if isinstance(parameter, Key) else "numbers"
-            raise InputError(where, f"a list of {what} is expected, got shape {array.shape} of {array.dtype}")
-        ends = (array.min(), array.max()) if array.dtype.kind == "f" and array.size else (np.nan,)
-        if isinstance(parameter, Parameter) and not parameter.whole and all(map(parameter.allows, ends)):
-            return array.astype(float)
-        given = array.tolist()
-    if not isinstance(given, Sequence) or isinstance(given, str | bytes):
+            raise InputError(where, f"a list of {what} is expected, got shape {given.shape} of {given.dtype}")
+    elif not isinstance(given, Sequence) or isinstance(given, str | bytes):
         raise InputError(where, f"a list of values is expected, got {show(given)}")
-    given = list(islice(given, most + 1))
-    if len(given) > most:
-        raise many
-    if not given:
-        raise InputError(where, "empty: give at least one value")
+    # Of a part, since the length of a range may overflow.
+    if (count := len(given[: most + 1])) > most or not count:
+        raise InputError(where, f"more than {most} values are too many" if count else "empty: give at least one value")
+    if isinstance(given, np.ndarray):
+        ends = (given.min(), given.max()) if given.dtype.kind == "f" else (np.nan,)
+        if isinstance(parameter, Parameter) and not parameter.whole and all(map(parameter.allows, ends)):
+            return given.astype(float)
+        given = given.tolist()
     if isinstance(parameter, Key):
         names, what = parameter.names, parameter.long_name
         return np.array([_registered(name, names, f"{where}.{i}", what) for i, name in enumerate(given)])

@@ -12,9 +12,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.axes import Axes, check_consistency, paths_of, read_spacing, swept_parameter
+from ringsweep.config.axes import Axes, check_consistency, paths_of, read_axis, swept_parameter
 from ringsweep.config.scene import outcome_numbers, sweepable
-from ringsweep.config.sections import Keys, check_keys, keys_of, one_of, read_keys, read_values, suggestion
+from ringsweep.config.sections import Keys, check_keys, keys_of, one_of, read_keys, read_values
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
@@ -265,12 +265,10 @@ def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping
 def _reference(given: Any, path: str, parameter: Any, known: Mapping[str, Parameter | Key], where: str) -> str:
     """The path that a ratio is over; the section may be left out."""
     beside = f"{path.rpartition('.')[0]}.{given}"
-    full = beside if beside in known else given
-    if not isinstance(full, str) or full not in known:
-        raise InputError(where, f"{show(given)} is no number of the scene" + suggestion(beside, known))
+    full = given if isinstance(given, str) and given in known else beside
     if full == path:
         raise InputError(where, f"{full} is the path itself")
-    if getattr(known[full], "unit", None) != parameter.unit:
+    if getattr(swept_parameter(known, full, where), "unit", None) != parameter.unit:
         raise InputError(where, f"{full} is no number in the unit of {path}: their ratio has no meaning")
     return full
 
@@ -359,8 +357,7 @@ def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str
 
 
 def _ascending(given: Any, parameter: Parameter, where: str) -> tuple[float, ...]:
-    read = read_spacing if isinstance(given, dict) else read_values
-    return tuple(np.unique(read(given, parameter, where)).tolist())
+    return tuple(np.unique(read_axis(given, parameter, where)).tolist())
 
 
 @np.errstate(all="ignore")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Axes, Config, sweepable
-from ringsweep.config.axes import Indices, by_law, dimension, laws_at, values_at
+from ringsweep.config.axes import Indices, by_law, dimension, values_at
 from ringsweep.config.options import DIRECTION
 from ringsweep.models import batch, model_of
 from ringsweep.models.model import Continues
@@ -151,8 +151,8 @@ def start_of(ds: xr.Dataset, config: Config, cell: Mapping[str, int]) -> dict[st
     now, before = dict[str, NDArray[np.float64]](), dict[str, NDArray[Any]]()
     for k in order[: order.index(cell[dim]) + 1]:
         here = {name: np.array([place]) for name, place in {**cell, dim: k}.items()}
-        structure = config.scene.structures[str(laws_at(config.scene, config.axes, here, 1)[0])]
-        now, _ = _started(structure, values_at(config.scene, config.axes, here, 1), before)
+        structure, _, values = next(by_law(config.scene, config.axes, here, 1))
+        now, _ = _started(structure, values, before)
         ended = ds.drop_dims("section", errors="ignore").isel({**cell, dim: k})
         before = now | {str(name): np.atleast_1d(number.values) for name, number in ended.items()}
     return {path: one.item() for path, one in now.items() if one.item() != config.scene.values.get(path)}
