@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from math import pi
 from typing import Any
@@ -26,6 +26,9 @@ from ringsweep.quantities.variables import written
 
 #: Values of ``initial.steady``.
 STEADY = {"slip": "the body rests in space, where spring, friction and constant forces balance"}
+
+#: Keys by section; a value has no keys below it.
+Tree = Mapping[str, Any]
 
 # Ends of the paths of numbers of one direction.
 _ENDS = tuple(f".{way}" for way in WAYS)
@@ -116,10 +119,11 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     names, defined, curve = own.read_laws(doc, scene, model, laws)
     moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
-    known = tuple(own.law_choice(model, defined).names)
+    known, types = tuple(own.law_choice(model, defined).names), tuple(defined.items())
     registered = MODELS[model], WITH_IMPACT.get(model), *map(LAWS.get, known), *DRIVES.values()
-    keys = _keys(moved, known, tuple(defined.items()), zones or ("zones.0",), (*DRIVES, own.FORMULA), *registered)
-    leaves = dict(keys.leaves(scene, names))
+    keys = _keys(moved, known, types, zones or ("zones.0",), (*DRIVES, own.FORMULA), *registered)
+    near = _keys(moved, tuple(names or MODELS[model].laws), types, zones[:1], (moved.drive,), *registered)
+    leaves = dict(_leaves(scene, keys, partial(_hint, moved, keys, near)))
     if not names:
         section_of(scene, "friction", "scene.")
         raise InputError(f"scene.{LAW}", f"missing: name a friction law: {', '.join(known)}")
@@ -136,11 +140,8 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     }
     values = _read_numbers(structures, leaves, swept)
     _warn_of_unused_numbers(structures, leaves)
-    numbers = numbers_of(structures)
-    _warn_of_lengths({path: values[path] for path, p in numbers.items() if p.unit == "m" and path in values})
-    for path, parameter in numbers.items():
-        if path in leaves:
-            warn_of_plain_angle(path, leaves[path], parameter)
+    lengths = (path for path, parameter in numbers_of(structures).items() if parameter.unit == "m" and path in values)
+    _warn_of_lengths({path: values[path] for path in lengths})
     return Scene(structures, values, scene)
 
 
@@ -256,6 +257,7 @@ def _read_numbers(
     for path, parameter in numbers_of(structures).items():
         if path in leaves:
             values[path] = quantity(leaves[path], parameter, f"scene.{path}")
+            warn_of_plain_angle(path, leaves[path], parameter)
         elif parameter.default is not None:
             values[path] = parameter.default
         elif not parameter.optional and path not in swept:
@@ -347,85 +349,75 @@ def structures_of(
         yield Structure(model, law, drive, arcs, own_law=defined.get(law), impact=model in WITH_IMPACT, **rest)
 
 
-class _Keys:
+@lru_cache(maxsize=16)
+def _keys(
+    moved: Structure,
+    laws: Collection[str],
+    defined: tuple[tuple[str, type], ...] = (),
+    zones: tuple[str, ...] = ("zones.0",),
+    drives: Collection[str] = (*DRIVES, own.FORMULA),
+    *_registered: Any,
+) -> Tree:
     """Keys that a scene of a model can have, under some laws and some drives.
 
-    Attributes
-    ----------
-    known : set of str
-        Paths of all values.
-    children : dict of str to dict
-        Keys below the path of each section.
+    They are found once for as long as the same types are registered under their names.
     """
-
-    def __init__(
-        self,
-        moved: Structure,
-        laws: Collection[str],
-        defined: tuple[tuple[str, type], ...] = (),
-        zones: tuple[str, ...] = ("zones.0",),
-        drives: Collection[str] = (*DRIVES, own.FORMULA),
-        *_registered: Any,
-    ):
-        self.moved, self.defined, self.zones = moved, defined, zones
-        rest = {"elsewhere": moved.elsewhere, "two_way": moved.two_way, "frame": moved.frame}
-        structures = [*structures_of(moved.model, laws, dict(defined), zones, drives, **rest)]
-        structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
-        paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
-        paths |= dict.fromkeys(path for structure in structures for path in parameters(structure))
-        self.known = set(paths)
-        self.children: dict[str, dict[str, None]] = {}
-        for path in paths:
-            while path:
-                parent, _, key = path.rpartition(".")
-                self.children.setdefault(parent, {})[key] = None
-                path = parent
-
-    def leaves(self, node: Any, laws: Collection[str], path: str = "") -> Iterator[tuple[str, Any]]:
-        """Path and value of every leaf of a scene with some laws, below a path that ends with a dot."""
-        section = path.rstrip(".")
-        where, children = f"scene.{path}".rstrip("."), self.children[section]
-        items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else None
-        if items is None:
-            raise InputError(where, f"a section is expected, got {show(node)} (known keys: {', '.join(children)})")
-        for key, value in items:
-            # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
-            if str(key) not in children:
-                raise InputError(f"{where}.{key}".rstrip("."), f"unknown key{self.hint(section, str(key), laws)}")
-            if path + str(key) in self.known:
-                yield f"{path}{key}", value
-            else:
-                yield from self.leaves(value, laws, f"{path}{key}.")
-
-    def hint(self, section: str, key: str, laws: Collection[str]) -> str:
-        """End of the message about an unknown key: a comma has made it, it belongs elsewhere, or is misspelt."""
-        if key[:1].isdigit():
-            return ": a comma ends a value in YAML, write a decimal point"
-        if section.startswith("zone") and key in ("from", "to", "start", "end", "width"):
-            return ": a zone has a center, (from + to)/2, and a half_angle or on a belt a half_length, (to - from)/2"
-        if not section and key in ("solver", "sweep", "record"):
-            return f": the section `{key}` stands beside `scene`, not in it: take away its indentation"
-        if len(key) < 2 or not any(str(known).startswith(key) for known in self.children.get(section, ())):
-            if places := self.ending_with(key):
-                return f"; did you mean {places}?"
-            for other in MODELS:
-                keys = _Keys(Structure(other, "", elsewhere=self.moved.elsewhere), MODELS[other].laws)
-                places = keys.ending_with(key)
-                if other != self.moved.model and (places or key in keys.children.get(section, ())):
-                    places = places or f"`{section}.{key}`".replace("`.", "`")
-                    return f": model {other} has {places}, this is model {self.moved.model}"
-        laws = laws or MODELS[self.moved.model].laws
-        near = _Keys(self.moved, laws, self.defined, self.zones[:1], (self.moved.drive,))
-        known = near.children.get(section, self.children[section])
-        numbers = [name for name in known if name != "law"]
-        # The only number of a section is the one that is meant, whatever it is called.
-        return suggestion(numbers[0] if len(numbers) == 1 else key, known)
-
-    def ending_with(self, key: str) -> str:
-        """Paths whose last key is `key`, as text; those of a list of zones are left out."""
-        found = [path for path in self.known if path.rpartition(".")[2] == key and not path.startswith("zones.")]
-        return " or ".join(f"`{path}`" for path in sorted(found))
+    rest = {"elsewhere": moved.elsewhere, "two_way": moved.two_way, "frame": moved.frame}
+    structures = [*structures_of(moved.model, laws, dict(defined), zones, drives, **rest)]
+    structures.append(replace(moved, law=structures[0].law, own_law=structures[0].own_law))
+    paths = dict.fromkeys(path for drive in drives for path in _structural(moved.model, drive, laws))
+    found: dict[str, Any] = {}
+    for path in paths | dict.fromkeys(path for structure in structures for path in parameters(structure)):
+        section = found
+        for key in path.split("."):
+            section = section.setdefault(key, {})
+    return found
 
 
-# Keys of a scene, found once for as long as the same types are registered under its names.
-_keys = lru_cache(maxsize=16)(_Keys)
+def _leaves(node: Any, keys: Tree, hint: Callable[[str, str, Tree], str], path: str = "") -> Iterator[tuple[str, Any]]:
+    """Path and value of every leaf of a scene that has these keys, below a path that ends with a dot.
+
+    `hint` makes the end of the message about a key that is not among those of its section.
+    """
+    where = f"scene.{path}".rstrip(".")
+    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else None
+    if items is None:
+        raise InputError(where, f"a section is expected, got {show(node)} (known keys: {', '.join(keys)})")
+    for key, value in items:
+        # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
+        if (below := keys.get(str(key))) is None:
+            raise InputError(f"{where}.{key}", f"unknown key{hint(path.rstrip('.'), str(key), keys)}")
+        if below:
+            yield from _leaves(value, below, hint, f"{path}{key}.")
+        else:
+            yield f"{path}{key}", value
+
+
+def _hint(moved: Structure, keys: Tree, near: Tree, section: str, key: str, here: Tree) -> str:
+    """End of the message about an unknown key: a comma has made it, it belongs elsewhere, or is misspelt.
+
+    `keys` are those of the scene, `near` those under the laws that are given, and `here` those of the section.
+    """
+    if key[:1].isdigit():
+        return ": a comma ends a value in YAML, write a decimal point"
+    if section.startswith("zone") and key in ("from", "to", "start", "end", "width"):
+        return ": a zone has a center, (from + to)/2, and a half_angle or on a belt a half_length, (to - from)/2"
+    if not section and key in ("solver", "sweep", "record"):
+        return f": the section `{key}` stands beside `scene`, not in it: take away its indentation"
+    if len(key) < 2 or not any(known.startswith(key) for known in here):
+        if places := _places(keys, key):
+            return f"; did you mean {' or '.join(sorted(places))}?"
+        for other in MODELS:
+            others = _keys.__wrapped__(Structure(other, "", elsewhere=moved.elsewhere), tuple(MODELS[other].laws))
+            if places := _places(others, key):
+                return f": model {other} has {' or '.join(sorted(places))}, this is model {moved.model}"
+    known = (written({"scene": near}, section) if section else near) or here
+    numbers = [name for name in known if name != "law"]
+    # The only number of a section is the one that is meant, whatever it is called.
+    return suggestion(numbers[0] if len(numbers) == 1 else key, known)
+
+
+def _places(keys: Tree, key: str, path: str = "") -> list[str]:
+    """Paths whose last key is `key`, as text; those of a list of zones are left out."""
+    found = [f"`{path}{key}`"] if key in keys else []
+    return found + [place for k, below in keys.items() if k != "zones" for place in _places(below, key, f"{path}{k}.")]
