@@ -191,11 +191,13 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
     laws = next(((where, given) for path, where, _, given in columns if path == LAW), None)
     if (file := options.run_to_continue(doc)) is not None:
         try:
-            options.put_state(doc, parse_scene(doc, swept, laws), file, load(file), swept)
+            state = options.state_after(doc, parse_scene(doc, swept, laws), file, load(file), swept)
         except InputError as error:
             if file not in (error.file, error.path):
                 raise
             raise InputError(options.FROM, f"{file}: {error.problem}") from None
+        for path, number in state.items():
+            _put(doc, f"scene.{path}", number, doc.locations.get(options.FROM, (None, None)))
     scene = parse_scene(doc, swept, laws)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = build_axes(scene, columns)
@@ -216,8 +218,8 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingPro
         raise InputError(excluding[0], problem)
     # Axes that a program gives are in SI units.
     _warn_of_units(scene, changed, columns if doc.columns is None and doc.locations else ())
-    if follow is not None and len(follow.ways) > 1:
-        axes = Axes({**axes.sizes, options.DIRECTION: len(follow.ways)}, axes.columns)
+    if follow is not None and follow.direction == "both":
+        axes = Axes({**axes.sizes, options.DIRECTION: len(options.BOTH)}, axes.columns)
     return Config(scene, solver, axes, tree, doc.file.stem, refine, sample, follow, begins_from=file)
 
 
@@ -247,7 +249,7 @@ def _apply_settings(doc: Document, settings: Iterable[Setting]) -> dict[str, tup
             value = scalar(text)
         else:
             path, value = setting
-        full, before = _apply_setting(doc, path, value)
+        full, before = _put(doc, path, value, (f"--set {path}={value}", None))
         before, _ = changed.get(full, (before, None))
         changed[full] = before if isinstance(setting, str) else None, value
     return changed
@@ -274,9 +276,11 @@ def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parame
         warn_once(f"{option} {form.format(value)} {said}")
 
 
-def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
-    """Put a value into the tree; its full path and what stood there. The path is checked later, with the tree."""
-    told = f"--set {path}={value}", None
+def _put(doc: Document, path: str, value: Any, told: tuple[str | None, int | None]) -> tuple[str, Any]:
+    """Put a value into the tree; its full path and what stood there. The path is checked later, with the tree.
+
+    `told` is what errors name as its place.
+    """
     full = path if path.split(".")[0] in ("scene", "solver", "record") else f"scene.{path}"
     for name in ELSEWHERE:
         if name in (written(doc.tree, "friction") or ()):

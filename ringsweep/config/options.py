@@ -142,12 +142,8 @@ class Follow:
         """Dimension that is followed, and indices along it in their order, shape ``(directions, cells of a chain)``."""
         (dim,), values = axes.columns[self.axis]
         up = np.argsort(values, kind="stable")
-        return dim, np.stack([up if way == "up" else up[::-1] for way in self.ways])
-
-    @property
-    def ways(self) -> tuple[str, ...]:
-        """Directions in which the axis is followed."""
-        return BOTH if self.direction == "both" else (self.direction,)
+        ways = BOTH if self.direction == "both" else (self.direction,)
+        return dim, np.stack([up if way == "up" else up[::-1] for way in ways])
 
 
 def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
@@ -229,8 +225,8 @@ def run_to_continue(doc: Document) -> str | None:
     return str(file)
 
 
-def put_state(doc: Document, scene: Scene, file: str, before: Any, swept: Collection[str]) -> None:
-    """Put the state at the end of the run in a file into the tree, as initial values.
+def state_after(doc: Document, scene: Scene, file: str, before: Any, swept: Collection[str]) -> dict[str, float]:
+    """Values of a scene that starts from the end of the run in a file, by path.
 
     Parameters
     ----------
@@ -269,32 +265,26 @@ def put_state(doc: Document, scene: Scene, file: str, before: Any, swept: Collec
         ended |= {name: np.ma.filled(content[name][:], np.nan).astype(float).ravel() for name in names}
         if not all(np.isfinite(ended[name]).all() for name in names):
             raise ValueError("a state has finite numbers")
-    _move_zones(doc, scene, ended, swept)
     values = {path: np.full(1, scene.values.get(path, np.nan)) for path in {**scene.values, **dict.fromkeys(swept)}}
     found = model.continued(scene.structure, values, ended)
     # What is too long for the bristles of this scene is an error in its place.
     found |= {path: ended["deflection_end"] for path in found if path == "initial.deflection"}
-    for path, (value,) in found.items():
-        section, _, name = path.partition(".")
-        given = doc.tree["scene"].setdefault(section, {})
-        if path in swept or name in given:
+    given = {path for path in found if written(doc.tree, path) is not None}
+    found |= _moved_zones(scene, ended)
+    for path in found:
+        if path in swept or path in given:
             raise InputError(f"scene.{path}", _BESIDE)
-        given[name] = float(value)
+    return {path: float(value) for path, (value,) in found.items()}
 
 
-def _move_zones(doc: Document, scene: Scene, ended: dict[str, Any], swept: Collection[str]) -> None:
-    """Put zones that ring or belt has carried along at constant speed where they are at the end of the run in a file.
+def _moved_zones(scene: Scene, ended: dict[str, Any]) -> dict[str, Any]:
+    """Centers of zones that ring or belt has carried along at constant speed, at the end of the run in a file.
 
     The run that goes on counts the way of ring or belt from 0 again.
     """
     structure = scene.structure
     speed = ended.get("belt.velocity", ended.get("drive.amplitude", 0.0) if structure.drive == "constant" else 0.0)
-    way = float(np.ravel(speed * ended["t_end"])[0])
-    for arc in structure.arcs if structure.frame == "belt" and way != 0.0 else ():
-        if f"{arc}.center" in swept:
-            raise InputError(f"scene.{arc}.center", _BESIDE)
-        name, _, number = arc.partition(".")
-        zone = doc.tree["scene"][name]
-        center = scene.values[f"{arc}.center"] + way
-        zone = zone[int(number)] if number else zone
-        zone["center"] = center if structure.model == "belt" else center % (2.0 * np.pi)
+    way = np.ravel(speed * ended["t_end"])[:1]
+    moved = structure.arcs if structure.frame == "belt" and way != 0.0 else ()
+    centers = {f"{arc}.center": scene.values[f"{arc}.center"] + way for arc in moved}
+    return centers if structure.model == "belt" else {path: center % (2.0 * np.pi) for path, center in centers.items()}
