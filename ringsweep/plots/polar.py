@@ -21,6 +21,7 @@ from ringsweep.plots.phase import draw_belt_portrait
 from ringsweep.plots.rig import Rig, has_spring, ring_history
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
+from ringsweep.runs.events import history_at
 
 #: Arrows whose lengths are in the units of the axes.
 ARROWS: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "minlength": 0.1, "zorder": 6}
@@ -86,11 +87,9 @@ def polar_view(ds: xr.Dataset, time: float | str, ax: Axes | None = None) -> Axe
 
 
 def states_at(run: xr.Dataset, times: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-    """State of a run at given times, by variable: numbers interpolated linearly, the mode of the sample before."""
-    own = run["time"].values
-    before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
-    states = {str(name): np.interp(times, own, one.values) for name, one in run.items() if one.dims == ("time",)}
-    return states | {"time": times, "mode": run["mode"].values[before]}
+    """State of a run at given times, by variable."""
+    found = history_at(run[[name for name, one in run.items() if one.dims == ("time",)]], times)
+    return {str(name): one.values for name, one in found.variables.items()}
 
 
 class Instant:
