@@ -96,7 +96,7 @@ def test_digest_is_that_of_the_sources_wherever_they_are(package):
 
 def test_kernels_take_nothing_but_flags_and_declarations_from_quantities():
     """Names, units and messages are no numbers of a kernel."""
-    declarations = {"Leaf", "MASSES", "OUTCOMES", "Parameter", "Variable", "declared", "show"}
+    declarations = {"Key", "Leaf", "MASSES", "OUTCOMES", "Parameter", "Variable", "declared", "show"}
     for folder in ("compile", "numerics", "physics", "models", "solvers"):
         for path in (PACKAGE / folder).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,6 @@ from ringsweep.quantities.parameters import Key, Parameter
 from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import is_plain, is_quantity, other_unit, quantity, show, spelled
 from ringsweep.quantities.variables import OUTCOMES
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 COUNT = Parameter("1", "number of values", lower=1, upper=MAX_LENGTH, whole=True)
 
@@ -128,7 +125,7 @@ def dimension(path: str) -> str:
     return path.replace(".", "_")
 
 
-def read_data_array(given: xr.DataArray, parameter: Parameter | Key, where: str) -> Column:
+def read_data_array(given: Any, parameter: Parameter | Key, where: str) -> Column:
     """Dimensions and values of a DataArray, converted from its ``units``, or from those of pint's quantities in it."""
     dims = tuple(map(str, given.dims))
     if not dims:

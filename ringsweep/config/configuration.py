@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 from ringsweep.config import options, yaml_text
@@ -171,7 +170,7 @@ def _document(config: Source, parts: Mapping[str, Any], axes: Mapping[str, Any] 
     return doc
 
 
-def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]] = MappingProxyType({})) -> Config:
+def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]]) -> Config:
     """The configuration of a document, in which a user has changed some values."""
     tree = doc.tree
     for key in tree:

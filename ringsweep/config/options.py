@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.axes import Axes, dimension, values_at
-from ringsweep.config.sections import choose, keys_of, read_keys, section_of, suggestion
+from ringsweep.config.sections import choose, read_keys, section_of, suggestion
 from ringsweep.config.yaml_text import Document, is_result
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, model_of
@@ -46,7 +46,7 @@ def read_solver(solver: Any, scene: Scene) -> Any:
     section = {"method": solver} if isinstance(solver, str) else section_of({"solver": solver}, "solver", "")
     method: Any = METHODS[choose(METHODS, section, "solver.method", "method")]
     given = {key: value for key, value in section.items() if key != "method"}
-    found = method(**read_keys(given, keys_of(method), "solver"))
+    found = method(**read_keys(given, method, "solver"))
     for structure in scene.structures.values():
         found.check(structure)
     return found
@@ -87,7 +87,7 @@ def read_refinement(given: Any, axes: Axes) -> Refinement | None:
     """
     if given is None or given is False:
         return None
-    section = read_keys({} if given is True else given, keys_of(Refinement), "sweep.refine")
+    section = read_keys({} if given is True else given, Refinement, "sweep.refine")
     return Refinement(_longest(axes), **section)
 
 
@@ -156,7 +156,7 @@ def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
     """
     if given is None:
         return None
-    section = read_keys(given if isinstance(given, dict) else {"axis": given}, keys_of(Follow), "sweep.follow")
+    section = read_keys(given if isinstance(given, dict) else {"axis": given}, Follow, "sweep.follow")
     where = "sweep.follow.axis" if isinstance(given, dict) else "sweep.follow"
     path = section["axis"]
     numeric = [name for name in axes.columns if name != LAW]

@@ -46,18 +46,6 @@ RECORD: Keys = {
     "section": Key("points of the motion that a run keeps"),
 }
 
-#: Keys of ``record.section``.
-SECTION: Keys = {
-    "at": Key(
-        "instant of a section",
-        {"period": "the end of each period of force or drive", "turn": "each maximum of x, on the belt"},
-    ),
-    "keep": Parameter("1", "number of points, the last of a run", lower=1, upper=16384, default=64, whole=True),
-    "period": Parameter(
-        "s", "time between two points, where force and drive have no period", lower=0.0, open_lower=True, optional=True
-    ),
-}
-
 
 def read_record(given: Any, model: str) -> tuple[bool, Section | None]:
     """Whether the mapping under ``record`` asks for the exponent, and the section that it asks for.
@@ -74,13 +62,12 @@ def read_record(given: Any, model: str) -> tuple[bool, Section | None]:
             raise InputError(f"record.{key}", f"model {model} has none: it is known of model {others}; leave it out")
     if record["section"] is None:
         return record["exponent"], None
-    able = MODELS[model].sections
-    at = Key("instant of a section", dict.fromkeys(able, ""), example=able[0])
-    section = read_keys(record["section"], {**SECTION, "at": at}, "record.section")
+    section = read_keys(record["section"], Section, "record.section")
+    one_of(section["at"], MODELS[model].sections, "record.section.at", "is no instant of a section")
     if section["period"] is not None and section["at"] != "period":
         problem = f"belongs to `at: period`, not to `at: {section['at']}`: leave it out"
         raise InputError("record.section.period", problem)
-    return record["exponent"], Section(**section)
+    return record["exponent"], Section(deflections=False, **section)
 
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Key]:
@@ -128,7 +115,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         section_of(scene, "friction", "scene.")
         raise InputError(f"scene.{LAW}", f"missing: name a friction law: {', '.join(known)}")
     if section is not None:
-        section = section._replace(deflections=any(family_of({**LAWS, **defined}[law]) is Dynamic for law in names))
+        section = replace(section, deflections=any(family_of({**LAWS, **defined}[law]) is Dynamic for law in names))
     moved = replace(moved, exponent=exponent, section=section, arcs=_arcs(scene, zones, leaves))
     tabled = {"drive": moved.drive == "table", "body.load": moved.load is not None}
     tabled["force"] = any(f"force.{name}" in leaves for name in own.TABLE_KEYS["force"])

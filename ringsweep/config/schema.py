@@ -11,16 +11,16 @@ from typing import Any
 
 from ringsweep.config import axes, own, uncertain
 from ringsweep.config.options import Follow, Refinement
-from ringsweep.config.scene import RECORD, SECTION, STEADY, structures_of
+from ringsweep.config.scene import RECORD, STEADY, structures_of
 from ringsweep.config.sections import Keys, keys_of
 from ringsweep.models import MODELS, parameters
-from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS
+from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS, Section
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.formula import COEFFICIENTS
 from ringsweep.physics.friction.laws import Table
 from ringsweep.physics.friction.registry import SURFACE
-from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.parameters import Key, Parameter
 from ringsweep.solvers import METHODS
 from ringsweep.statistics import DISTRIBUTIONS
 
@@ -72,8 +72,8 @@ def schema() -> dict[str, Any]:
     scene["required"], parts["drive"]["required"] = ["model"], ["law"]
     for section, what in {"friction": "friction law", "drive": "drive", "force": "force", "load": "load"}.items():
         parts[section]["additionalProperties"] = _number(Parameter("", f"parameter of a {what} by formula"))
-    record = _section(_keys(RECORD, section=_section(_keys(SECTION), "at")))
-    record = {"description": "what a run records", **record}
+    points = _section(_keys(keys_of(Section)), "at")
+    record = _any(_section(_keys(RECORD, section=points)), description="what a run records")
     sections = {"scene": scene, "solver": _solver(), "record": record, "sweep": _sweep(list(known))}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "ringsweep configuration"}
     return head | _section(sections, "scene")
@@ -152,15 +152,14 @@ def _constants(meanings: Mapping[str, str]) -> list[dict[str, str]]:
 
 def _keys(keys: Keys, **others: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Schemas of the values under the keys of a section; `others` are those that a function of their own reads."""
-    found = {}
-    for name, key in keys.items():
-        if isinstance(key, Parameter):
-            found[name] = _number(key)
-        elif key.names:
-            found[name] = _word(key.long_name, key.names)
-        else:
-            found[name] = {"description": key.long_name, **others.get(name, _FLAG)}
-    return found
+    return {name: _key(key, others.get(name, _FLAG)) for name, key in keys.items()}
+
+
+def _key(key: Parameter | Key, form: dict[str, Any]) -> dict[str, Any]:
+    """Schema of a value; `form` is that of one which is neither a number nor a name."""
+    if isinstance(key, Parameter):
+        return _number(key)
+    return _word(key.long_name, key.names) if key.names else {"description": key.long_name, **form}
 
 
 def _solver() -> dict[str, Any]:
@@ -218,5 +217,5 @@ def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
         "survival": axis,
         "sensitivity": {"anyOf": [_FLAG, _section({"of": _list(_TEXT)}, "of")]},
     }
-    found = _section(_keys({**keys_of(uncertain.Sample), **uncertain.ASKED}, **others), *("n", "of"))
-    return {"description": "uncertain parameters: each cell of the grid is sampled", **found}
+    about = "uncertain parameters: each cell of the grid is sampled"
+    return _any(_section(_keys(uncertain.KEYS, **others), "n", "of"), description=about)

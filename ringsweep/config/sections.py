@@ -110,20 +110,20 @@ def keys_of(cls: Any) -> dict[str, Parameter | Key]:
     found, notes = dict[str, Parameter | Key](), declared(cls)
     for one in dataclasses.fields(cls):
         default: Any = None if one.default is dataclasses.MISSING else one.default
-        if one.name in notes or isinstance(default, bool):
+        if one.init and (one.name in notes or isinstance(default, bool)):
             found[one.name] = replace(notes.get(one.name, Key("whether the answer is checked")), default=default)
     return found
 
 
-def read_keys(given: Any, keys: Keys, where: str) -> dict[str, Any]:
-    """Values of a section by key; None where one is left out that has no default.
+def read_keys(given: Any, keys: Keys | type, where: str) -> dict[str, Any]:
+    """Values of a section by key, or by field of a dataclass; None where one is left out that has no default.
 
     Raises
     ------
     InputError
         If `given` is no section, has an unknown key or a wrong value, or lacks a key that must be given.
     """
-    section = section_of({where: given}, where, "")
+    section, keys = section_of({where: given}, where, ""), keys_of(keys) if isinstance(keys, type) else keys
     check_keys(section, keys, where)
     found: dict[str, Any] = {}
     for name, key in keys.items():

@@ -24,14 +24,6 @@ from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import NUMBER, is_plain, quantity, show
 from ringsweep.statistics import DISTRIBUTIONS, METHODS, distribution, saltelli, unit_points
 
-#: Keys of ``sweep.sample`` that functions of their own read.
-ASKED: Keys = {
-    "of": Key("distributions by path", example="{body.mass: {normal: [76 g, 1 %]}}"),
-    "quantiles": Key("variable -> levels"),
-    "survival": Key("times at which it is asked whether the contacts still hold"),
-    "sensitivity": Key("Sobol indices, and of which variables beside the regimes"),
-}
-
 # Mean and tolerance of a uniform distribution, as engineers write them.
 _TOLERANCE = re.compile(r"\s*(.+?)\s*(?:±|\+/?-)\s*(.+?)\s*")
 
@@ -110,9 +102,9 @@ class Sample:
 
     factors: tuple[Factor, ...]
     n: Annotated[int, Parameter("1", "points of each cell", 2, 1_000_000)]
-    quantiles: Mapping[str, tuple[float, ...]]
-    survival: tuple[float, ...]
-    sensitivity: bool
+    quantiles: Annotated[Mapping[str, tuple[float, ...]], Key("variable -> levels")]
+    survival: Annotated[tuple[float, ...], Key("times at which it is asked whether the contacts still hold")]
+    sensitivity: Annotated[bool, Key("Sobol indices, and of which variables beside the regimes")]
     sensitive: tuple[str, ...]
     method: Annotated[str, Key("method of drawing points", dict.fromkeys(METHODS, ""))] = METHODS[0]
     seed: Annotated[int, Parameter("1", "seed of the sample", 0, 2**53)] = 0
@@ -158,6 +150,10 @@ class Sample:
         return Axes({**axes.sizes, "sample": len(shares)}, columns)
 
 
+#: Keys of ``sweep.sample``.
+KEYS: Keys = {**keys_of(Sample), "of": Key("distributions by path", example="{body.mass: {normal: [76 g, 1 %]}}")}
+
+
 @lru_cache(maxsize=2)
 def _shares(method: str, size: int, factors: int, seed: int, replicates: int, sensitivity: bool) -> NDArray[np.float64]:
     drawn = factors * (2 if sensitivity else 1)
@@ -181,17 +177,14 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     if given is None:
         return None
     where = "sweep.sample"
-    section = read_keys(given, {**keys_of(Sample), **ASKED}, where)
+    section = read_keys(given, KEYS, where)
     _check_number(section["method"], section["n"], section["replicates"])
-    sensitivity, sensitive = _sensitivity(section["sensitivity"], scene, bool(section["survival"]))
-    time = Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
-    own = {
-        "factors": _factors(section.pop("of"), scene, axes),
-        "quantiles": _quantiles(section["quantiles"], scene),
-        "survival": () if (asked := section["survival"]) is None else _ascending(asked, time, f"{where}.survival"),
-        "sensitivity": sensitivity,
-    }
-    found = Sample(**section | own, sensitive=sensitive)
+    asked, time = section["survival"], Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
+    section["sensitivity"], section["sensitive"] = _sensitivity(section["sensitivity"], scene, bool(asked))
+    section["factors"] = _factors(section.pop("of"), scene, axes)
+    section["quantiles"] = _quantiles(section["quantiles"], scene)
+    section["survival"] = () if asked is None else _ascending(asked, time, f"{where}.survival")
+    found = Sample(**section)
     cells = math.prod(axes.sizes.values())
     for path, total in (("", cells * found.replicates), (".keep", cells * found.n * found.rows * found.keep)):
         if total > MAX_CELLS:

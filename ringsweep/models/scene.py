@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from ringsweep.errors import InputError
 from ringsweep.physics.drives import DRIVES, FORMULAS
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.velocity import EXPRESSIONS
+from ringsweep.quantities.parameters import Key, Parameter
 
 Values = Mapping[str, NDArray[np.float64]]
 
@@ -33,7 +34,16 @@ WAYS = "forward", "backward"
 FRAMES = {"belt": "the zones move with the belt, and repeat with belt.period", "space": "the zones stand in space"}
 
 
-class Section(NamedTuple):
+_OWN_PERIOD = Parameter(
+    "s", "time between two points, where force and drive have no period", 0.0, open_lower=True, optional=True
+)
+
+#: Values of ``record.section.at``.
+INSTANTS = {"period": "the end of each period of force or drive", "turn": "each maximum of x, on the belt"}
+
+
+@dataclass(frozen=True)
+class Section:
     """Points of a motion that a run keeps.
 
     Attributes
@@ -48,10 +58,10 @@ class Section(NamedTuple):
         Time between two points, s, where neither force nor drive has a period.
     """
 
-    at: str
-    keep: int
-    deflections: bool = False
-    period: float | None = None
+    at: Annotated[str, Key("instant of a section", INSTANTS, example="period")]
+    deflections: bool
+    keep: Annotated[int, Parameter("1", "number of points, the last of a run", 1, 16384)] = 64
+    period: Annotated[float | None, _OWN_PERIOD] = None
 
 
 @dataclass(frozen=True)

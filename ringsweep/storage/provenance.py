@@ -23,7 +23,7 @@ from ringsweep.compile.cache import OWN_FILES
 from ringsweep.config import Config, as_named
 from ringsweep.errors import shortened
 from ringsweep.models import model_of
-from ringsweep.models.scene import ELSEWHERE, LAW, Section
+from ringsweep.models.scene import ELSEWHERE, LAW
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import TRAITS
 
@@ -82,8 +82,8 @@ def identity(config: Config) -> dict[str, str]:
     asked = {"record.section": structure.section, "sweep.follow": config.follow, "sweep.refine": config.refine}
     for path, part in (asked | {"sweep.sample": config.sample, "solver": config.solver}).items():
         if part is not None:
-            values = part._asdict() if isinstance(part, Section) else dataclasses.asdict(part)
-            found |= {f"{path}.{key}": json.dumps(value) for key, value in values.items() if value is not None}
+            values = dataclasses.asdict(part).items()
+            found |= {f"{path}.{key}": json.dumps(value) for key, value in values if value is not None}
     found |= {"solver": config.solver.name, "record.exponent": json.dumps(structure.exponent)}
     found["sweep"] = ", ".join(f"{name} {size}" for name, size in axes.sizes.items()) or "a single run"
     for path, (dims, column) in axes.columns.items():
