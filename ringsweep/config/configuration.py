@@ -10,13 +10,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ringsweep.config import options, yaml_text
+from ringsweep.config import options
 from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
-from ringsweep.config.options import Follow, Refinement, read_solver
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import suggestion, warn_once
 from ringsweep.config.uncertain import Sample, read_sample
-from ringsweep.config.yaml_text import Document, Source, scalar
+from ringsweep.config.yaml_text import Document, Source, read, scalar
 from ringsweep.errors import InputError
 from ringsweep.models.scene import ELSEWHERE, LAW, WAYS, Scene
 from ringsweep.physics.friction.registry import SURFACE
@@ -69,9 +68,9 @@ class Config:
     axes: Axes
     source: dict[str, Any]
     name: str
-    refine: Refinement | None = None
+    refine: options.Refinement | None = None
     sample: Sample | None = None
-    follow: Follow | None = None
+    follow: options.Follow | None = None
     begins_from: str | None = None
 
     @property
@@ -150,7 +149,7 @@ def with_values(
 
 def _document(config: Source, parts: Mapping[str, Any], axes: Mapping[str, Any] | None = None) -> Document:
     """A configuration in which a program has put axes and other parts in the place of its own; see :func:`load`."""
-    doc = yaml_text.read(config)
+    doc = read(config)
     if axes is not None:
         if not isinstance(axes, Mapping):
             raise InputError("axes", f"a mapping of paths to values is expected, got {show(axes)}")
@@ -198,7 +197,7 @@ def _validate(doc: Document, changed: Mapping[str, tuple[Any, Any]]) -> Config:
         for path, number in state.items():
             _put(doc, f"scene.{path}", number, doc.locations.get(options.FROM, (None, None)))
     scene = parse_scene(doc, swept, laws)
-    solver = read_solver(tree.get("solver", "auto"), scene)
+    solver = options.read_solver(tree.get("solver", "auto"), scene)
     axes = build_axes(scene, columns)
     for path, where in swept.items():
         if where in doc.locations:

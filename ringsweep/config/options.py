@@ -74,6 +74,8 @@ class Refinement:
 def read_refinement(given: Any, axes: Axes) -> Refinement | None:
     """Read and validate the value under ``sweep.refine``, or under ``refine`` in Python.
 
+    The dimensions that are refined are the two longest, in the order of the grid.
+
     Parameters
     ----------
     given : mapping or bool or None
@@ -88,11 +90,6 @@ def read_refinement(given: Any, axes: Axes) -> Refinement | None:
     if given is None or given is False:
         return None
     section = read_keys({} if given is True else given, Refinement, "sweep.refine")
-    return Refinement(_longest(axes), **section)
-
-
-def _longest(axes: Axes) -> tuple[str, ...]:
-    """The dimensions that are refined: the two longest, in the order of the grid."""
     for path, (dims, _) in axes.columns.items():
         if dims != (dimension(path),):
             problem = f"varies along {' x '.join(dims)}, but only a grid can be refined: a point has no neighbours"
@@ -106,7 +103,7 @@ def _longest(axes: Axes) -> tuple[str, ...]:
         if not ((steps > 0).all() or (steps < 0).all()):
             problem = "values go up and down: along an axis that is refined they must ascend or descend"
             raise InputError(f"sweep.grid.{path}", problem)
-    return tuple(dimension(path) for path in known if path in longest)
+    return Refinement(tuple(dimension(path) for path in known if path in longest), **section)
 
 
 #: Dimension of a sweep that follows its axis in both directions, and its values.

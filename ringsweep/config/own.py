@@ -5,7 +5,6 @@ A table has two columns, in lists or in a CSV file.
 
 from __future__ import annotations
 
-import dataclasses
 import importlib.util
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -22,7 +21,6 @@ from ringsweep.models.scene import LAW
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, TRAITS, add_law, laws
 from ringsweep.physics.friction.formula import FRICTION, FormulaError
-from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.quantities.parameters import Key, Parameter, declared
 from ringsweep.quantities.units import show
 from ringsweep.statistics import Floats
@@ -39,8 +37,8 @@ LAW_KEYS: Keys = {
     "at_rest": Key("coefficient up to which friction holds at rest; without it the law is smooth"),
 }
 
-# Laws that a Python session has defined.
-_REGISTERED: dict[str, Definition] = {}
+# Laws that a Python session has defined, as sections.
+_REGISTERED: dict[str, dict[str, str]] = {}
 
 
 def laws_with(path: object) -> str:
@@ -83,11 +81,10 @@ def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:
     >>> run = ringsweep.sweep(scene, {})
     """
     _check_name(name, "friction_law")
-    definition = Definition(mu, at_rest)
-    law = _law(definition, "friction_law")
+    law = _law("friction_law", mu, at_rest)
     LAWS.pop(name, None)
     add_law(name, law, TRAITS[law])
-    _REGISTERED[name] = definition
+    _REGISTERED[name] = {"mu": mu} | ({} if at_rest is None else {"at_rest": at_rest})
 
 
 def _check_name(name: object, path: str) -> None:
@@ -107,13 +104,12 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
     found = {}
     for name, section in section_of({"laws": {}, **friction}, "laws", "scene.friction.").items():
         path = f"scene.friction.laws.{name}"
-        definition = Definition(**read_keys(section, LAW_KEYS, path))
         _check_name(name, path)
-        found[name] = _law(definition, path)
+        found[name] = _law(path, **read_keys(section, LAW_KEYS, path))
     # Beside another law a text may be the formula for a sweep over laws; a number is a misnamed coefficient.
     of_formula = friction.get("law", FORMULA) == FORMULA or isinstance(friction.get("mu"), str)
     if "mu" in friction and friction.get("law") != TABLE_LAW and of_formula:
-        found[FORMULA] = _law(Definition(friction["mu"], friction.get("at_rest")), "scene.friction")
+        found[FORMULA] = _law("scene.friction", friction["mu"], friction.get("at_rest"))
     return found
 
 
@@ -159,9 +155,7 @@ def read_laws(
     for name in names:
         # A file contains the formulas of laws that this process has defined: other processes know only these.
         if name in _REGISTERED and name not in section.get("laws", {}):
-            definition = dataclasses.asdict(_REGISTERED[name])
-            kept = {key: value for key, value in definition.items() if value is not None}
-            section["laws"] = {**section.get("laws", {}), name: kept}
+            section.setdefault("laws", {})[name] = dict(_REGISTERED[name])
     return names, own | own_laws(section), curve
 
 
@@ -204,11 +198,11 @@ def force_type(force: Any, section: str = "force") -> type | None:
     return _defined(lambda: drives.define(formula, "N"), {"mu": (f"scene.{section}.formula", formula)})
 
 
-def _law(definition: Definition, path: str) -> type:
-    if not isinstance(definition.mu, str):
-        raise InputError(f"{path}.mu", f"a formula such as {FRICTION.example} is expected, got {show(definition.mu)}")
-    texts = {"mu": (f"{path}.mu", definition.mu), "at_rest": (f"{path}.at_rest", definition.at_rest)}
-    return _defined(lambda: define(definition), texts)
+def _law(path: str, mu: Any, at_rest: Any) -> type:
+    if not isinstance(mu, str):
+        raise InputError(f"{path}.mu", f"a formula such as {FRICTION.example} is expected, got {show(mu)}")
+    texts = {"mu": (f"{path}.mu", mu), "at_rest": (f"{path}.at_rest", at_rest)}
+    return _defined(lambda: laws.define(laws.Definition(mu, at_rest)), texts)
 
 
 def _defined(make: Callable[[], type], texts: Mapping[str, tuple[str, Any]]) -> type:

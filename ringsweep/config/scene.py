@@ -102,7 +102,10 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     model = choose(MODELS, scene, "scene.model", "model")
     exponent, section = read_record(doc.tree.get("record", {}), model)
     elsewhere = _name_elsewhere(scene, swept)
-    zones = _zones(scene)
+    given = scene.get("zones", [])
+    if not isinstance(given, list) or ("zones" in scene and not given):
+        raise InputError("scene.zones", f"a list of zones is expected, got {show(given)}")
+    zones = tuple(f"zones.{i}" for i in range(len(given)))
     names, defined, curve = own.read_laws(doc, scene, model, laws)
     moved = replace(_read_motion(scene, model, swept), elsewhere=elsewhere)
     # Name a misspelt key, rather than the key that is missing because of it.
@@ -148,14 +151,6 @@ def _name_elsewhere(scene: dict[str, Any], swept: Collection[str]) -> str:
 def as_named(path: str, name: str) -> str:
     """The path with this name of ``friction.elsewhere`` in the place of its other one."""
     return re.sub(rf"^((scene\.)?friction)\.({'|'.join(ELSEWHERE)})(?=\.|$)", rf"\1.{name}", path)
-
-
-def _zones(scene: dict[str, Any]) -> tuple[str, ...]:
-    """Paths of the list ``zones``."""
-    given = scene.get("zones", [])
-    if not isinstance(given, list) or ("zones" in scene and not given):
-        raise InputError("scene.zones", f"a list of zones is expected, got {show(given)}")
-    return tuple(f"zones.{i}" for i in range(len(given)))
 
 
 def _arcs(scene: dict[str, Any], zones: tuple[str, ...], leaves: Collection[str]) -> tuple[str, ...]:

@@ -214,10 +214,8 @@ def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
         for path, parameter in parameters.items():
             if isinstance(parameter, Key):
                 raise InputError(where, f"a {parameter.long_name} has no distribution: make it an axis of sweep.grid")
-            if path in axes.columns:
-                raise InputError(where, "also an axis of the sweep: a path can vary in one place only")
-            if path in drawn:
-                raise InputError(where, f"{path} is drawn twice")
+            if path in axes.columns or path in drawn:
+                raise InputError(where, f"{path} varies elsewhere too: a path can vary in one place only")
             drawn.add(path)
         found.append(_factor(spec, parameters, where, known))
     ratios = {factor.name: factor.over for factor in found if factor.over is not None}

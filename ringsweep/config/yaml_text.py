@@ -278,10 +278,10 @@ def _plain(value: Any, path: str) -> str | bool | int | float | None:
     if isinstance(value, bool | np.bool_):
         return bool(value)
     if isinstance(value, Integral):
-        if abs(int(value)) >= LONG_INTEGER:
-            raise InputError(path, f"{show(int(value))} is no value for a configuration")
-        return int(value)
-    if isinstance(value, Real):
+        value = int(value)
+        if abs(value) < LONG_INTEGER:
+            return value
+    elif isinstance(value, Real):
         return float(value)
     raise InputError(path, f"{show(value)} is no value for a configuration: give text, a number, a list or a mapping")
 
