@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
-from ringsweep.config import load, sections
+from ringsweep.config import load, reading
 from ringsweep.models import MODELS, batch, parameters
 from ringsweep.models.scene import Structure
 from ringsweep.runs import task_sizes
@@ -108,7 +108,7 @@ FIGURES: Mapping[int, Figure] = MappingProxyType(
 @pytest.fixture(autouse=True)
 def each_test_is_warned() -> None:
     """A warning that an earlier test of this process has met is given again."""
-    sections.warn_once.cache_clear()
+    reading.warn_once.cache_clear()
 
 
 @pytest.fixture(scope="session")

@@ -463,7 +463,7 @@ class TestParts:
             (3.0, r"force: a section is expected"),
             (TIMES, r"force\.force: missing"),
             (FORCES | {"time": [0.0, 1.0, 2.0, 3.0]}, r"time\.span: 10 s is longer than the table of the force"),
-            (TIMES | {"force": [1.0] * 3}, r"force\.force: 3 forces for 4 times"),
+            (TIMES | {"force": [1.0] * 3}, r"force\.force: 3 values, but time has 4"),
             (TIMES | FORCES | {"frequency": 1.0}, r"force\.frequency: cannot stand beside"),
             ({"file": "no.csv"}, r"force\.file.*no\.csv"),
             (TIMES | FORCES | {"interpolate": "spline"}, r"interpolate: 'spline' is no interpolation of a force"),

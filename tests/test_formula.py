@@ -713,7 +713,7 @@ class TestTable:
         ("friction", "problem"),
         [
             ({"law": "table"}, "scene.friction.v: missing: a table needs a file, or the lists v and mu"),
-            (table([0, 1], [0.4]), "scene.friction.mu: 1 coefficients for 2 speeds"),
+            (table([0, 1], [0.4]), "scene.friction.mu: 1 values, but v has 2"),
             (table([0], [0.4]), "scene.friction.v: 1 rows are too few"),
             (table([0, 1, 1], [0.4, 0.3, 0.2]), "scene.friction.v.2: 1 m/s does not come after 1 m/s"),
             (table([0.1, 1], [0.4, 0.3]), "scene.friction.v.0: the table begins at 0.1 m/s"),

@@ -103,7 +103,7 @@ def test_rk4_and_events_agree(friction, amplitude):
         ({"formula": "A*floor(t)"}, "scene.body.load.formula"),
         ({"formula": "A*t", "A": 1, "file": "load.csv"}, "scene.body.load.file: cannot stand beside a formula"),
         ({"time": [0, 1], "load": [1, 2]}, "table of the body.load, which ends at 1 s"),
-        ({"time": [0, 10], "load": [1]}, "scene.body.load.load: 1 loads for 2 times"),
+        ({"time": [0, 10], "load": [1]}, "scene.body.load.load: 1 values, but time has 2"),
     ],
 )
 def test_mistakes_are_located(load, words):

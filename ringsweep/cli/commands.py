@@ -212,7 +212,7 @@ def _single_run(arguments: argparse.Namespace) -> Any:
     if not arguments.sel:
         return with_values(arguments.config, arguments.set)
     from ringsweep.cli.drawing import selection_of
-    from ringsweep.config.yaml_text import is_result
+    from ringsweep.config.reading import is_result
     from ringsweep.storage import netcdf
 
     if not is_result(Path(arguments.config)):

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.own import laws_with
+from ringsweep.config.reading import MAX_VALUES, Document, check_keys, read_values, section_of, suggestion
 from ringsweep.config.scene import sweepable
-from ringsweep.config.sections import MAX_LENGTH, check_keys, read_values, section_of, suggestion
-from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW, Scene, Structure
@@ -22,7 +21,7 @@ from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import is_plain, is_quantity, other_unit, quantity, show, spelled
 from ringsweep.quantities.variables import OUTCOMES
 
-COUNT = Parameter("1", "number of values", lower=1, upper=MAX_LENGTH, whole=True)
+COUNT = Parameter("1", "number of values", lower=1, upper=MAX_VALUES, whole=True)
 
 _SPACINGS: dict[str, Any] = {"linspace": np.linspace, "geomspace": np.geomspace}
 

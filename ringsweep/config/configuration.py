@@ -1,7 +1,7 @@
 """Whole configurations: from text to a validated scene, axes and solver in SI units.
 
 Physics and solvers declare their parameters; error messages are made from these declarations.
-:mod:`ringsweep.config.yaml_text` knows the lines, :mod:`ringsweep.quantities.units` the units.
+:mod:`ringsweep.config.reading` knows the lines, :mod:`ringsweep.quantities.units` the units.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from typing import Any
 
 from ringsweep.config import options
 from ringsweep.config.axes import Axes, Given, build_axes, check_consistency, columns_of, sweep_section, swept_paths
+from ringsweep.config.reading import Document, Source, read, scalar, suggestion, warn_once
 from ringsweep.config.scene import as_named, parse_scene, sweepable, warn_of_plain_angle
-from ringsweep.config.sections import suggestion, warn_once
 from ringsweep.config.uncertain import Sample, read_sample
-from ringsweep.config.yaml_text import Document, Source, read, scalar
 from ringsweep.errors import InputError
 from ringsweep.models.scene import ELSEWHERE, LAW, WAYS, Scene
 from ringsweep.physics.friction.registry import SURFACE

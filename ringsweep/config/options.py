@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.axes import Axes, dimension, values_at
-from ringsweep.config.sections import choose, read_keys, section_of, suggestion
-from ringsweep.config.yaml_text import Document, is_result
+from ringsweep.config.reading import Document, choose, is_result, read_keys, section_of, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, model_of
 from ringsweep.models.model import Continues
@@ -116,9 +115,6 @@ DIRECTIONS = {
     "both": "up and down, along the dimension direction",
 }
 
-# Drives that are the same at all times, or whose phase a scene can have.
-_WITH_PHASE = "none", "constant", "sinusoidal"
-
 
 @dataclass(frozen=True)
 class Follow:
@@ -185,7 +181,8 @@ def check_continues(structure: Structure, where: str) -> None:
     if TRAITS[structure.law_type].snaps:
         problem = f"the state of friction law {structure.law} is more than a deflection: choose another law"
         raise InputError(where, problem)
-    if structure.own_drive is not None or structure.drive not in _WITH_PHASE:
+    # Other drives are not the same at all times, nor can a scene have their phase.
+    if structure.own_drive is not None or structure.drive not in ("none", "constant", "sinusoidal"):
         raise InputError(where, f"drive law {structure.drive} has no phase to go on from: sinusoidal has one")
     if structure.own_force is not None or structure.force is not None:
         raise InputError(where, "a force by a table or a formula has no phase to go on from: one with a frequency has")

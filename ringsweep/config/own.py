@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ringsweep.config.sections import Keys, choose, one_of, read_keys, read_values, section_of, warn_once
-from ringsweep.config.yaml_text import Document
+from ringsweep.config.reading import Document, Keys, choose, one_of, read_keys, read_values, section_of, warn_once
 from ringsweep.errors import InputError, nearest_name, shortened
 from ringsweep.models import MODELS
 from ringsweep.models.scene import LAW
@@ -248,11 +247,6 @@ TABLE_KEYS = {of: (*columns, "file", *["interpolate"] * (of in INTERPOLATIONS)) 
 
 _NO_JUMP = ": its place must not jump; for steps of its velocity give `law: formula` with velocity: piecewise(...)"
 
-# Share of the range of a table that a spline through it may leave; a sine with six rows a period leaves less.
-_OVERSHOOT = 0.1
-
-_PLURAL = {"time": "times", "theta": "angles", "force": "forces", "load": "loads", "v": "speeds", "mu": "coefficients"}
-
 
 # Factor by which numbers of a table may grow before they overflow.
 _ROOM = 1e100
@@ -265,18 +259,16 @@ def read_samples(doc: Document, given: dict[str, Any], section: str) -> tuple[Fl
     interpolate = one_of(given.get("interpolate", next(iter(known))), known, where, problem)
     times, samples = read_table(doc, given, section, 4 if interpolate == "spline" else 2)
     if interpolate == "spline":
-        _warn_of_overshoot(times, samples, section)
+        # It is slow to import, and only splines need it.
+        from scipy.interpolate import CubicSpline
+
+        between = CubicSpline(times, samples)(times[:-1] + np.diff(times) * np.linspace(0.0, 1.0, 9)[:, None])
+        beyond = max(np.max(between) - np.max(samples), np.min(samples) - np.min(between))
+        # A sine with six rows a period leaves less.
+        if beyond > 0.1 * np.ptp(samples):
+            cure = "`interpolate: monotone` stays between rows"
+            warn_once(f"scene.%s: the spline leaves the range of its table by %.3g; {cure}", section, beyond)
     return times, samples, interpolate
-
-
-def _warn_of_overshoot(times: Floats, samples: Floats, section: str) -> None:
-    from scipy.interpolate import CubicSpline
-
-    between = CubicSpline(times, samples)(times[:-1] + np.diff(times) * np.linspace(0.0, 1.0, 9)[:, None])
-    beyond = max(np.max(between) - np.max(samples), np.min(samples) - np.min(between))
-    if beyond > _OVERSHOOT * np.ptp(samples):
-        cure = "`interpolate: monotone` stays between rows"
-        warn_once(f"scene.%s: the spline leaves the range of its table by %.3g; {cure}", section, beyond)
 
 
 def read_table(doc: Document, given: dict[str, Any], section: str, least: int) -> tuple[Floats, Floats]:
@@ -317,7 +309,7 @@ def read_table(doc: Document, given: dict[str, Any], section: str, least: int) -
             raise InputError(f"{where}.{name}", f"missing: a table needs a file, or the lists {first} and {second}")
     x, y = (read_values(given[name], parameter, f"{where}.{name}") for name, parameter in columns.items())
     if len(x) != len(y):
-        raise InputError(f"{where}.{second}", f"{len(y)} {_PLURAL[second]} for {len(x)} {_PLURAL[first]}")
+        raise InputError(f"{where}.{second}", f"{len(y)} values, but {first} has {len(x)}")
     if len(x) < least:
         raise InputError(f"{where}.{first}", f"{len(x)} rows are too few: a table needs at least {least}")
     unit = columns[first].unit

@@ -11,8 +11,7 @@ from math import pi
 from typing import Any
 
 from ringsweep.config import own
-from ringsweep.config.sections import Keys, choose, missing_text, one_of, read_keys, section_of, suggestion, warn_once
-from ringsweep.config.yaml_text import Document
+from ringsweep.config.reading import Document, choose, missing, one_of, read_keys, section_of, suggestion, warn_once
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
 from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS, Scene, Section, Structure
@@ -30,9 +29,6 @@ STEADY = {"slip": "the body rests in space, where spring, friction and constant 
 #: Keys by section; a value has no keys below it.
 Tree = Mapping[str, Any]
 
-# Ends of the paths of numbers of one direction.
-_ENDS = tuple(f".{way}" for way in WAYS)
-
 # Ratio of lengths of one scene above which a unit may be wrong: 1 m in place of 1 mm.
 _LARGEST_RATIO = 1000.0
 
@@ -41,7 +37,7 @@ _LARGEST_ANGLE = 4.0 * pi
 
 
 #: Keys of the section ``record``.
-RECORD: Keys = {
+RECORD = {
     "exponent": Key("whether a run tells its Lyapunov exponent and its Floquet multipliers", default=False),
     "section": Key("points of the motion that a run keeps"),
 }
@@ -193,12 +189,11 @@ def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> S
 
 def _starts_steadily(scene: dict[str, Any], swept: Collection[str]) -> bool:
     """Whether the body is launched at steady slip, which leaves nothing of its state to choose."""
-    initial = scene.get("initial")
-    if not isinstance(initial, Mapping) or "steady" not in initial:
+    if (steady := written({"scene": scene}, "initial.steady")) is None:
         return False
-    one_of(initial["steady"], STEADY, "scene.initial.steady", "is no steady motion")
+    one_of(steady, STEADY, "scene.initial.steady", "is no steady motion")
     for name in ("x", "velocity", "deflection", "contact_age"):
-        if name in initial or f"initial.{name}" in swept:
+        if name in scene["initial"] or f"initial.{name}" in swept:
             raise InputError(f"scene.initial.{name}", "cannot stand beside initial.steady, which gives it")
     return True
 
@@ -209,7 +204,7 @@ def _two_way(scene: dict[str, Any], swept: Collection[str]) -> tuple[str, ...]:
     A number of which the sweep varies one direction becomes two, as ``--set`` makes them.
     """
     sections = dict(_sections(scene))
-    split = *sections, *(path.rpartition(".")[0] for path in map(str, swept) if path.endswith(_ENDS))
+    split = *sections, *(path.rpartition(".")[0] for path in map(str, swept) if path.rpartition(".")[2] in WAYS)
     found = tuple(path for path in dict.fromkeys(split) if path.rpartition(".")[2] in SURFACE)
     for path in found:
         place, _, name = path.rpartition(".")
@@ -243,7 +238,7 @@ def _read_numbers(
         elif parameter.default is not None:
             values[path] = parameter.default
         elif not parameter.optional and path not in swept:
-            raise InputError(f"scene.{path}", missing_text(path, parameter) + _who_needs(path, structures))
+            raise InputError(f"scene.{path}", missing(path, parameter) + _who_needs(path, structures))
     return values
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from ringsweep.config import axes, own, uncertain
 from ringsweep.config.options import Follow, Refinement
+from ringsweep.config.reading import Keys, keys_of
 from ringsweep.config.scene import RECORD, STEADY, structures_of
-from ringsweep.config.sections import Keys, keys_of
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import ELSEWHERE, FRAMES, LAW, WAYS, Section
 from ringsweep.physics.drives import DRIVES

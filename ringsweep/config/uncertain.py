@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.axes import Axes, check_consistency, paths_of, read_axis, swept_parameter
+from ringsweep.config.reading import Keys, check_keys, keys_of, one_of, read_keys, read_values
 from ringsweep.config.scene import outcome_numbers, sweepable
-from ringsweep.config.sections import Keys, check_keys, keys_of, one_of, read_keys, read_values
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
@@ -178,7 +178,13 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
         return None
     where = "sweep.sample"
     section = read_keys(given, KEYS, where)
-    _check_number(section["method"], section["n"], section["replicates"])
+    n, replicates, sobol = section["n"], section["replicates"], section["method"] == "sobol"
+    size, rest = divmod(n, replicates)
+    if rest or size < 1 or (sobol and size & (size - 1)):
+        near = max(n / replicates, 1.0)
+        fitting = replicates * (2 ** round(math.log2(near)) if sobol else round(near))
+        parts = "of a power of two, as Sobol points are" if sobol else "of one length"
+        raise InputError(f"{where}.n", f"{n} is not {replicates} replicates {parts}: give {fitting}")
     asked, time = section["survival"], Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
     section["sensitivity"], section["sensitive"] = _sensitivity(section["sensitivity"], scene, bool(asked))
     section["factors"] = _factors(section.pop("of"), scene, axes)
@@ -191,16 +197,6 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
             raise InputError(where + path, f"{total:.3g} parts or runs: at most {MAX_CELLS:.3g} fit")
     _check_points(found, scene, axes)
     return found
-
-
-def _check_number(method: str, n: int, replicates: int) -> None:
-    size, rest = divmod(n, replicates)
-    sobol = method == "sobol"
-    if rest or size < 1 or (sobol and size & (size - 1)):
-        near = max(n / replicates, 1.0)
-        fitting = replicates * (2 ** round(math.log2(near)) if sobol else round(near))
-        parts = "of a power of two, as Sobol points are" if sobol else "of one length"
-        raise InputError("sweep.sample.n", f"{n} is not {replicates} replicates {parts}: give {fitting}")
 
 
 def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:

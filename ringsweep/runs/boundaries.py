@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, load
 from ringsweep.config.axes import check_consistency
-from ringsweep.config.sections import suggestion
+from ringsweep.config.reading import suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import WITH_IMPACT, model_of
 from ringsweep.models.scene import Scene

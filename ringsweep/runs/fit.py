@@ -15,8 +15,7 @@ import xarray as xr
 from ringsweep.compile import readable_compile_errors
 from ringsweep.config import Config, as_named, load, sweepable, with_values
 from ringsweep.config.axes import dimension
-from ringsweep.config.sections import one_of, read_values
-from ringsweep.config.yaml_text import Document, name_and_unit
+from ringsweep.config.reading import Document, name_and_unit, one_of, read_values
 from ringsweep.errors import InputError
 from ringsweep.models import batch, model_of
 from ringsweep.quantities.parameters import Parameter

@@ -12,8 +12,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Config, as_named, load, sweepable, tell_unit, with_values, yaml_text
+from ringsweep.config import Config, as_named, load, sweepable, tell_unit, with_values
 from ringsweep.config.axes import Axes, dimension, sweep_section, swept_parameter, swept_paths
+from ringsweep.config.reading import read
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Key, Parameter
 from ringsweep.quantities.quantity import after_number
@@ -287,7 +288,7 @@ def interval(whole: Config, path: str, between: Any, *forms: tuple[str, str]) ->
 
 def _beside_axes(config: Any, path: str, settings: list[Any]) -> list[Any]:
     """Settings without those of axes other than `path`: what is swept beside it has one value here, which they give."""
-    doc = yaml_text.read(config)
+    doc = read(config)
     with doc.locating_errors():
         sweep = sweep_section(doc)
     others = set() if "sample" in sweep else set(swept_paths(sweep)) - {path.removeprefix("scene.")}
