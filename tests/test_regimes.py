@@ -66,42 +66,10 @@ class TestMotion:
 
 
 class TestReversals:
-    def test_chatter_within_the_threshold_is_no_reversal(self):
-        omega = 0.999 * EPSILON * np.resize([1.0, -1.0], 100)
-        assert outcome(np.zeros(100), omega).reversals == 0
-        assert outcome(np.zeros(100), 1.01 * omega).reversals == 99
-
-    def test_chatter_between_two_threshold_passes_counts_as_one_reversal(self):
-        omega = [1.0, *(0.9 * EPSILON * np.resize([1.0, -1.0], 20)), -1.0, 0.0, -1.0]
-        assert outcome(np.zeros(len(omega)), omega).reversals == 1
-
-    def test_touching_zero_is_no_reversal(self):
-        assert outcome(np.zeros(5), [1.0, 0.0, 1.0, -EPSILON, 1.0]).reversals == 0
-
     @given(st.lists(st.floats(-3 * EPSILON, 3 * EPSILON), min_size=1, max_size=50))
     def test_reversals_are_changes_of_sign_beyond_the_threshold(self, omega):
         signs = [np.sign(w) for w in omega if abs(w) > EPSILON]
         assert outcome(np.zeros(len(omega)), omega).reversals == sum(a != b for a, b in pairwise(signs))
-
-
-states = st.lists(st.tuples(st.floats(-20, 20), st.floats(-5, 5)), min_size=1, max_size=30)
-
-
-class TestRecord:
-    @given(states)
-    def test_recorded_extremes_bound_every_state(self, states):
-        phi, omega = zip(*states, strict=True)
-        found = outcome(phi, omega)
-        assert (found.phi_min, found.phi_max) == (min(phi), max(phi))
-        assert (found.omega_min, found.omega_max) == (min(omega), max(omega))
-        assert (found.phi_end, found.omega_end) == (phi[-1], omega[-1])
-
-    def test_stick_time_is_the_sum_over_intervals(self):
-        assert outcome(np.zeros(5), np.zeros(5), stuck_for=0.25).stick_time == 1.0
-
-    def test_least_reaction_of_a_separating_contact_is_zero(self):
-        found = outcome([0.0, 0.1], [1.0, 1.0], SEPARATED_2, normal_1=0.3, normal_2=-0.01)
-        assert (found.normal_min_1, found.normal_min_2) == (0.3, 0.0)
 
 
 class TestEnd:
