@@ -115,35 +115,6 @@ def orders(scene, steps):
     return -np.polyfit(np.log(steps), np.log(errors), 1)[0]
 
 
-class TestLinearSystem:
-    """The stages solve ``(shift I - J) k = r`` with the Jacobian of a body on bristles."""
-
-    @pytest.mark.parametrize("count", [0, 1, 2])
-    def test_solution_of_the_linear_system_agrees_with_numpy(self, count):
-        rng = np.random.default_rng(count)
-        for decay in (1.0, 1e6, 1e12):
-            block, couplings = rng.normal(size=4), rng.normal(size=(count, 3))
-            couplings[:, 2] = -decay * abs(couplings[:, 2])
-            right, shift = rng.normal(size=2 + count), 3.0
-            jacobian = np.zeros((2 + count, 2 + count))
-            jacobian[:2, :2] = block.reshape(2, 2)
-            jacobian[1, 2:], jacobian[2:, 1] = couplings[:, 0], couplings[:, 1]
-            jacobian[range(2, 2 + count), range(2, 2 + count)] = couplings[:, 2]
-            found = np.array(rosenbrock.inverse(tuple(map(tuple, jacobian)), shift)) @ right
-            expected = np.linalg.solve(shift * np.eye(2 + count) - jacobian, right)
-            np.testing.assert_allclose(found, expected, rtol=1e-11)
-
-
-class TestDenseOutput:
-    def test_rates_are_the_derivative_of_the_dense_output(self):
-        rng = np.random.default_rng(0)
-        before, after, bends, h, e = (1.0, 2.0), (1.5, 1.0), rng.normal(size=(3, 2)), 0.2, 1e-6
-        for fraction in (0.0, 0.3, 0.8, 1.0):
-            ahead, behind = (rosenbrock.dense(before, after, bends, fraction + side * e) for side in (1, -1))
-            found = rosenbrock.dense_rates(before, after, bends, fraction, h)
-            np.testing.assert_allclose(found, np.subtract(ahead, behind) / (2 * e * h), rtol=1e-8, atol=1e-8)
-
-
 class TestOrder:
     def test_order_is_5_where_nothing_is_stiff(self):
         end, within, estimate = orders(Kaps(1.0), [8, 12, 16, 24, 32])

@@ -145,22 +145,11 @@ class TestFirstRoot:
         assert found
         assert s == pytest.approx(where, abs=1e-7)
 
-    def test_root_at_the_end_of_the_step_is_found(self):
-        c = series([1.0, -1.0])
-        s, found = first(c, 1.0)
-        assert found
-        assert s == pytest.approx(1.0, rel=1e-15)
-        assert first(c, 1.0 - 1e-15) == (1.0 - 1e-15, False)
-
     @given(st.floats(-100, 100).map(lambda e: 10.0**e), st.floats(0.01, 0.99))
     def test_first_root_does_not_depend_on_the_unit(self, unit, where):
         plain, scaled = first(from_roots([where, 1.5]), 1.0), first(from_roots([where, 1.5], unit), 1.0)
         assert plain[1] == scaled[1] == 1
         assert scaled[0] == pytest.approx(plain[0], rel=1e-14)
-
-    def test_constant_series_has_no_root(self):
-        assert first(series([inf]), 2.0) == (2.0, False)
-        assert first(series([1.0]), 2.0) == (2.0, False)
 
 
 class TestCrossings:
