@@ -111,18 +111,6 @@ class TestEveryLaw:
         assert by_v == pytest.approx(by_velocity[1] / small_v, abs=1e-4 * 2.0)
         assert by_z == pytest.approx(by_deflection[1] / small_z, abs=1e-4 * SIGMA_0)
 
-    @given(velocities, deflections, signs, regions)
-    def test_law_is_equal_in_a_mirror_image(self, law, v, z, sign, region):
-        rate, rate_v, rate_z, mu, by_v, by_z = bristle(law, MU_S, MU_K, v, z, sign, region)
-        mirrored = bristle(law, MU_S, MU_K, -v, -z, -sign, region)
-        assert mirrored == (-rate, rate_v, rate_z, -mu, by_v, by_z)
-        if not isinstance(law, Bristles):
-            assert region_guard(law, MU_S, MU_K, -v, -z, -sign, region) == region_guard(
-                law, MU_S, MU_K, v, z, sign, region
-            )
-            deflection, following = after_yield(law, MU_S, MU_K, z, sign, region)
-            assert after_yield(law, MU_S, MU_K, -z, -sign, region) == (-deflection, following)
-
     def test_bristles_are_a_spring_of_stiffness_sigma0_in_presliding(self, law):
         """Creep takes at most the share x sigma0/mu_k of a displacement x."""
         for x in (1e-2 * LONGEST, 1e-4 * LONGEST):

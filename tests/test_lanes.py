@@ -4,14 +4,11 @@ from math import inf
 
 import numpy as np
 import pytest
-import xarray as xr
-from belts import on_belt, with_all_parts
 from hypothesis import given
 from hypothesis import strategies as st
 from solutions import made
 from tiers import mostly_slow
 
-import ringsweep
 from ringsweep.compile import kernel, take
 from ringsweep.models import MODELS
 from ringsweep.models.parts import exceeds, larger_eigenvalue
@@ -166,24 +163,6 @@ MILD = {
     "elasto-plastic": {"sigma0": 100.0, "sigma1": 1.0, "sigma2": 0.1, "v_s": 0.1},
     "reset-integrator": {"sigma0": 100.0, "sigma1": 1.0},
 }
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("law", MILD)
-def test_neighbours_of_a_run_change_no_bit_of_it(law):
-    rng = np.random.default_rng(7)
-    axes = {"belt.velocity": rng.uniform(-0.5, 0.5, 40), "spring.stiffness": rng.uniform(20.0, 60.0, 40)}
-    axes |= {"force.amplitude": rng.uniform(0.0, 5.0, 40), "force.frequency": rng.uniform(0.5, 2.0, 40)}
-    scene = with_all_parts(on_belt({"law": law, "mu_s": 0.2, "mu_k": 0.1, **MILD[law]}, velocity=0.1, span=3.0))
-
-    def ends(cells):
-        columns = {path: xr.DataArray(column[cells], dims="cell") for path, column in axes.items()}
-        return ringsweep.sweep(scene, columns, solver={"method": "rk4", "steps": 3000}, jobs=1, progress=False)
-
-    together, order = ends(np.arange(40)), rng.permutation(40)
-    assert len(np.unique(together.slips)) > 3
-    for cells in (order, *([i] for i in (0, 17, 39))):
-        xr.testing.assert_equal(ends(cells), together.isel(cell=cells))
 
 
 @pytest.mark.slow

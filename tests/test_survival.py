@@ -447,16 +447,3 @@ class TestResultFile:
         assert same_bits(one, two)
         assert not write(load(two), one, Execution(progress=False))
         assert "replaced" not in caplog.text
-
-
-@pytest.mark.parametrize(
-    "solver", mostly_slow(["auto", {"method": "rk4", "steps": 300}], ["auto"]), ids=["event", "rk4"]
-)
-def test_order_of_computation_does_not_change_bits(scene, monkeypatch, solver):
-    axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 9), "zone.half_angle": np.radians([5.0, 20.0, 40.0])}
-    whole = ringsweep.sweep(scene, axes, solver=solver, progress=False, jobs=1)
-    for size, jobs in ((1, 2), (5, 1), (20, 2)):
-        monkeypatch.setattr(TaskSizes, "next", lambda self, left, size=size: size)
-        parted = ringsweep.sweep(scene, axes, solver=solver, progress=False, jobs=jobs)
-        for name in whole.data_vars:
-            assert parted[name].values.tobytes() == whole[name].values.tobytes(), name
