@@ -10,7 +10,7 @@ from solutions import Fall, solve
 
 from ringsweep.compile import take
 from ringsweep.models.ring.record import Outcome
-from ringsweep.quantities.flags import COARSE, FAILED, NO_RESULT, NOT_ASKED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import COARSE, FAILED, NO_RESULT, NOT_ASKED, OSCILLATORY, REVOLVING, SEPARATING
 from ringsweep.solvers import event
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.certificate import with_errors
@@ -141,48 +141,6 @@ class TestCertificate:
 
 class TestSurface:
     """Zones at the ends of their ranges."""
-
-    AMPLITUDES = np.array([0.2, 2.0, 5.0, -5.0])
-
-    def agree(self, one, other):
-        np.testing.assert_array_equal(kinds(one), kinds(other))
-        np.testing.assert_allclose(one.phi_end, other.phi_end, atol=1e-7)
-        np.testing.assert_allclose(one.stick_time, other.stick_time, atol=1e-7)
-
-    def test_full_arc_or_an_equal_arc_changes_no_run_on_a_uniform_surface(self, scenes):
-        direct, other = (0.2, 0.1), (0.9, 0.8)
-        found = [
-            solve(
-                Auto(),
-                scenes(
-                    dict(zip(COEFFICIENTS, (*rough, *rest), strict=True))
-                    | {"zone.half_angle": half_angle, "drive.amplitude": self.AMPLITUDES}
-                ),
-            )
-            for half_angle, rough, rest in ((0.0, other, direct), (pi, direct, other), (1.0, direct, direct))
-        ]
-        assert {RESTING, OSCILLATORY} <= set(found[0].regime)
-        for one in found[1:]:
-            self.agree(one, found[0])
-
-    def test_later_arc_holds_where_arcs_overlap_and_else_their_order_is_free(self, scenes):
-        def arcs(*given):
-            names = ("center", "half_angle", "mu_s", "mu_k")
-            changes = {
-                f"zones.{k}.{name}": x for k, arc in enumerate(given) for name, x in zip(names, arc, strict=True)
-            }
-            paths = tuple(f"zones.{k}" for k in range(len(given)))
-            return solve(Auto(), scenes(changes | {"drive.amplitude": self.AMPLITUDES}, arcs=paths))
-
-        wide, narrow = (0.5, 0.3), (0.1, 0.05)
-        whole = arcs((0.9, 0.5, *wide), (0.9, 0.2, *narrow))
-        parts = arcs((0.55, 0.15, *wide), (0.9, 0.2, *narrow), (1.25, 0.15, *wide))
-        self.agree(whole, parts)
-        hidden = arcs((0.9, 0.2, *narrow), (0.9, 0.5, *wide))
-        self.agree(hidden, arcs((0.9, 0.5, *wide)))
-        assert (whole.phi_end != hidden.phi_end).any()
-        apart = (0.9, 0.2, *narrow), (2.0, 0.5, *wide), (-2.0, 0.5, *narrow)
-        np.testing.assert_array_equal(arcs(*apart).rows, arcs(*apart[::-1]).rows)
 
     @pytest.mark.parametrize("contact", [-1, 1])
     @pytest.mark.parametrize("end", [-1, 1])

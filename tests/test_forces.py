@@ -1,7 +1,6 @@
 """A damper, a cubic spring and forces on the belt, against closed forms, published numbers and other integrators."""
 
 from math import asin, cos, pi, sin, sqrt
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -13,18 +12,11 @@ from solutions import cell_of
 from tiers import mostly_slow
 
 import ringsweep
-from ringsweep.compile import Cells, kernel, map_leaves, take
-from ringsweep.config import load
-from ringsweep.models import batch
 from ringsweep.models.belt.mode import Mode
-from ringsweep.models.interface import audit, implicit, series
-from ringsweep.numerics.terms import COLUMNS
-from ringsweep.physics import belt, drives, ring
+from ringsweep.models.interface import audit, implicit
+from ringsweep.physics import drives
 from ringsweep.physics.forces import Forced
-from ringsweep.physics.friction import SetValued
 from ringsweep.physics.friction.velocity import BAND, KINETIC
-from ringsweep.solvers.audit import Audit, audit_step
-from ringsweep.solvers.steps import Step, scratch_for
 
 G = 9.81
 SMALL_STEPS = {"method": "rk4", "steps": 20_000}
@@ -42,12 +34,6 @@ def forced(law="stiction", *, friction=0.0, load=0.0, v_b=0.0, span=10.0, force=
     start = x, v_b if v is None else v
     scene = on_belt(friction, k, cubic=cubic, damping=c, velocity=v_b, gravity=1.0, start=start, span=span)
     return scene | {"force": {"amplitude": 0.0, "frequency": 0.0, "phase": 0.0, "constant": 0.0} | (force or {})}
-
-
-@kernel
-def expanded(cells, mode, t, y, c):
-    """Fill a table with series at the tolerance 1e-10; return the longest step, s."""
-    return series.fill_table(take(cells, 0), mode, t, y, 1e-10, c)[0]
 
 
 def end(scene, solver="auto"):
@@ -295,21 +281,6 @@ class TestMethods:
         np.testing.assert_allclose(end(scene, solver), end(scene, EXACT), atol=1e-9)
 
     @pytest.mark.slow
-    def test_smooth_law_tends_to_its_limit_with_all_parts(self):
-        """Bengisu-Akay friction creeps, in implicit steps, where tustin sticks."""
-        force = {"amplitude": 0.6, "frequency": 0.2}
-        scene = forced("bengisu-akay", friction=0.5, load=0.3, v_b=0.2, c=0.2, cubic=2.0, force=force)
-        tail = {name: scene["friction"][name] for name in ("mu_s", "mu_k", "alpha")}
-        limit = outcome(scene | {"friction": {"law": "tustin"} | tail})
-        assert 2.0 < float(limit.stick_time) < 9.0
-        bands, errors = np.array([1e-4, 1e-5, 1e-6]), []
-        for v0 in bands:
-            found = outcome(scene | {"friction": scene["friction"] | {"v0": v0}})
-            assert found.certified == 1
-            errors.append(abs(float(found.x_end - limit.x_end)))
-        assert np.polyfit(np.log(bands), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.2)
-
-    @pytest.mark.slow
     def test_bristles_agree_between_implicit_and_rk4_with_all_parts(self):
         scene = everything(np.random.default_rng(7), "lugre")
         scene["friction"] |= {"sigma0": 300.0, "sigma1": 10.0, "sigma2": 0.1, "v_s": 0.05, "mu_s": 0.4, "mu_k": 0.3}
@@ -378,28 +349,6 @@ class TestAudit:
             assert self.violation(scene, t) < 1e-3
             assert self.violation(scene, t, 1e-3) > 1e3
 
-    def test_energy_has_the_cubic_spring(self):
-        scene = self.cell()
-        forcing = drives.turn(scene.drive, 0.0)
-        assert audit.energy_of(scene, forcing, (0.3, 0.7)) == pytest.approx(0.5 * 0.8**2 + 0.5 * 0.09 + 0.5 * 0.3**4)
-
-    @pytest.mark.slow
-    def test_work_of_a_wrong_force_does_not_explain_the_energy(self):
-        """A series about a wrong time has a wrong force."""
-        scene, mode, y = self.cell(), Mode(1, KINETIC, -1, (), ()), (0.3, 0.7)
-        audits = []
-        for late in (0.0, 0.01):
-            c = np.zeros((series.table_shape(scene)[0], COLUMNS))
-            h = 0.5 * expanded(Cells(map_leaves(lambda leaf: np.array([leaf]), scene)), mode, 0.2 + late, y, c)
-            step = Step(mode, False, 0.2, h, y, series.state_at(scene, c, h))
-            scratch = scratch_for(1, 0)._replace(c=c)
-            found = audit_step(SetValued(), scene, step, scratch, 1e-10, Audit(0.0, 0.0, 0.0))
-            audits.append((found.violation, abs(found.unexplained) / found.turnover))
-        (violation, share), (wrong_violation, wrong_share) = audits
-        assert violation < 1.0
-        assert wrong_violation > 1e4
-        assert 10.0 * share < wrong_share
-
 
 class TestParts:
     """A scene has the parts that it names, or that a sweep gives."""
@@ -408,27 +357,6 @@ class TestParts:
         scene = forced(friction=0.4, load=0.1)
         del scene["force"], scene["damper"], scene["spring"]["cubic"]
         return scene | sections
-
-    def cells(self, scene, swept=()):
-        found = load({"scene": scene} | ({"sweep": {"grid": {path: [0.5] for path in swept}}} if swept else {}))
-        values = found.scene.values | dict.fromkeys(swept, 0.5)
-        return batch(found.scene.structure, {path: np.array([value]) for path, value in values.items()})
-
-    PARTS: ClassVar = {
-        **{"damper.coefficient": "damping", "spring.cubic": "cubic", "force.constant": "force"},
-        "body.normal_stiffness": "normal_stiffness",
-    }
-
-    def test_scene_without_the_parts_has_no_place_for_their_numbers(self):
-        cells = self.cells(self.plain())
-        assert type(cells.body) is ring.variant(belt.OnBelt, belt.OPTIONAL)
-        assert type(cells.drive) is drives.Constant
-
-    @pytest.mark.parametrize(("swept", "part"), PARTS.items())
-    def test_swept_part_is_present_and_the_others_are_not(self, swept, part):
-        cells = self.cells(self.plain(), (swept,))
-        assert [name for name in belt.OPTIONAL if type(cells.body) in ring.having(belt.OnBelt, name)] == [part]
-        assert isinstance(cells.drive, Forced) == (part == "force")
 
     def test_parts_without_effect_change_nothing(self):
         plain, zero = self.plain(), forced(friction=0.4, load=0.1)

@@ -1,18 +1,15 @@
 """Equations of the ring: balances, symmetries, limits; and compiled functions against plain formulas."""
 
-from math import cos, exp, pi, radians, sin
+from math import cos, radians, sin
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-import solutions
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from solutions import ball, rod
 
-from ringsweep.compile import kernel, take
-from ringsweep.models.inspection import slip_in_space
-from ringsweep.models.interface.constant_step import inspect
+from ringsweep.compile import take
 from ringsweep.physics import ring
 from ringsweep.physics.ring import acceleration, acceleration_slope, reactions
 
@@ -275,61 +272,3 @@ class TestGeometry:
         # Without friction it is a longer pendulum.
         M, J, xi, g = beside.mass, beside.inertia, beside.xi, beside.gravity
         assert motion(beside, 0.0, 0.0, 1.0, 2.0)[0] == pytest.approx(-M * g * xi / (J + M * xi**2) * sin(1.0))
-
-
-def _friction(scene, phi, omega, theta, ring_omega):
-    """Friction K at both contacts, and its slopes, s/m."""
-    angle, v = (sin(phi), cos(phi)), (omega - ring_omega) * scene.body.radius
-    slip, _ = slip_in_space(scene, (phi, omega), v, (theta, ring_omega), angle)
-    return slip.K, slip.slopes
-
-
-@kernel
-def compiled_inspect(batch, i, y, theta, ring_omega):
-    return inspect(take(batch, i), y, (theta, ring_omega))
-
-
-class TestCompiledModel:
-    """A compiled inspection against the balances, solved as three linear equations in Python."""
-
-    #: Angle and angular velocity of the body, angle of the ring.
-    STATES = np.random.default_rng(22).uniform((-9, -40, -9), (9, 40, 9), (200, 3))
-
-    def test_compiled_inspection_agrees_with_the_balances(self, cells):
-        batch = cells({"friction.alpha": 2.0, "friction.v0": 0.3, "zone.half_angle": 1.0}, drive="arctan")
-        body = take(batch.body, 0)
-        met = set()
-        for phi, omega, theta in self.STATES:
-            ring_omega = 0.5 * omega + 1.0
-            v = (omega - ring_omega) * body.radius
-            K = []
-            for contact in (phi - body.beta, phi + body.beta):
-                rough = (contact - theta + 1.0) % (2 * pi) < 2.0
-                mu_s, mu_k = (0.5, 0.3) if rough else (0.2, 0.1)
-                inside, speed = abs(v) < 0.3, abs(v)
-                size = mu_s * (1 - (1 - speed / 0.3) ** 2) if inside else mu_k + (mu_s - mu_k) * exp(-2 * (speed - 0.3))
-                K.append(-np.sign(v) * size)
-                met.add((rough, inside, v > 0))
-            now = compiled_inspect(batch, 0, (phi, omega), theta, ring_omega)
-            found = (now.rates[1], now.normal_1, now.normal_2)
-            balanced = solutions.motion(body, *K) @ (omega**2, cos(phi), sin(phi))
-            np.testing.assert_allclose(found, balanced, rtol=1e-9, atol=1e-9)
-            assert now.v == pytest.approx(v, rel=1e-14)
-            assert now.rates[0] == now.motion[2] == omega
-        assert len(met) == 8
-
-    def test_compiled_slope_is_the_derivative_by_way_of_friction_only(self, cells):
-        batch = cells({"friction.alpha": 2.0, "friction.v0": 0.3, "zone.half_angle": 1.0}, drive="arctan")
-        body, scene = take(batch.body, 0), take(batch, 0)
-        for phi, omega, theta in self.STATES:
-            ring_omega, step = 0.5 * omega + 1.0, 1e-6
-            speed = abs(omega - ring_omega) * body.radius
-            if min(speed, abs(speed - 0.3)) < 1e-4:
-                continue
-            ends = []
-            for sliding in (omega - step, omega + step):
-                K, _ = _friction(scene, phi, sliding, theta, ring_omega)
-                ends.append(acceleration(body, *K, (sin(phi), cos(phi), omega))[0])
-            difference = (ends[1] - ends[0]) / (2 * step)
-            slope = compiled_inspect(batch, 0, (phi, omega), theta, ring_omega).slope
-            assert slope == pytest.approx(difference, rel=1e-5, abs=1e-3)
