@@ -115,37 +115,12 @@ def test_masses_without_a_coupling_move_as_two_belts():
             np.testing.assert_allclose(pair[f"{name}_{j}"], alone[j][name], rtol=1e-11, atol=1e-11, err_msg=name)
 
 
-def test_exchanged_masses_exchange_their_outcomes():
-    points = random_pairs(8, seed=5)
-    points["initial.velocity_1"] = points["initial.velocity_2"][::-1]
-    other = {"1": "2", "2": "1"}
-    exchanged = {path[:-1] + other[path[-1]] if path[-1] in other else path: p for path, p in points.items()}
-    for name in ("mu_s", "mu_k"):
-        # The friction of mass 1 is that without a number.
-        exchanged[f"friction.{name}_2"] = exchanged[f"friction.{name}"]
-        exchanged[f"friction.{name}"] = exchanged.pop(f"friction.{name}_1")
-    one, two = runs(coupled(), points, certify=False), runs(coupled(), exchanged, certify=False)
-    np.testing.assert_array_equal(one.regime, two.regime)
-    for name in ("motion", "x_end", "velocity_end", "x_min", "x_max", "stick_time", "slips", "force_max"):
-        for j in "12":
-            np.testing.assert_allclose(one[f"{name}_{j}"], two[f"{name}_{other[j]}"], rtol=1e-7, atol=1e-8)
-
-
 def test_equal_masses_move_as_one_and_do_not_feel_their_coupling():
     found = runs(coupled(masses=(1.0, 1.0), stiffness=(2.0, 2.0)), {"spring.coupling": [0.0, 1.0, 10.0]})
     assert found.certified.all()
     for name in ("x_end", "velocity_end", "x_max", "stick_time", "slips", "period"):
         np.testing.assert_allclose(found[f"{name}_1"], found[f"{name}_1"][0], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(found[f"{name}_2"], found[f"{name}_1"], rtol=1e-9, atol=1e-9)
-
-
-def test_rigidly_coupled_masses_move_as_one_body():
-    pair = runs(coupled(coupling=1e5), {"belt.velocity": [0.1, 0.2]}, certify=False)
-    scene = {"model": "belt", "body": {"mass": 2.5}, "spring": {"stiffness": 5.0}, "belt": {"velocity": 0.1}}
-    one = runs(scene | {"friction": STICTION, "time": {"span": 40.0}}, {"belt.velocity": [0.1, 0.2]}, certify=False)
-    for j in (1, 2):
-        assert (pair.ringsweep.words(f"motion_{j}") == one.ringsweep.words("motion")).all()
-        np.testing.assert_allclose(pair[f"x_max_{j}"], one.x_max, rtol=1e-3)
 
 
 def test_bounds_of_certified_pairs_hold():

@@ -87,16 +87,6 @@ def test_an_axis_over_one_way_of_a_number_leaves_the_other_way_as_it_is():
     xr.testing.assert_identical(*(run.drop_attrs() for run in runs))
 
 
-@pytest.mark.slow
-def test_two_equal_numbers_are_one_number_in_a_zone_of_a_ring():
-    rough, found = ({"mu_s": 0.4, "mu_k": 0.3}, {"mu_s": 0.4, "mu_k": {"forward": 0.3, "backward": 0.3}}), []
-    for one in rough:
-        friction = {"law": "stiction", "rough": one, "elsewhere": {"mu_s": 0.2, "mu_k": 0.1}}
-        scene = on_ring("ring", friction, drive={"law": "sinusoidal", "frequency": 1.0})
-        found.append(ringsweep.sweep(scene, {"drive.amplitude": np.linspace(0.1, 1.0, 12)}, progress=False))
-    xr.testing.assert_identical(*(run.drop_attrs() for run in found))
-
-
 def on_ring(model, friction, **rest):
     """A body at the bottom of a ring, which has a zone if the friction has a rough one."""
     body = {"inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01} if model == "ring" else {}
@@ -151,17 +141,6 @@ def test_rk4_and_events_agree_under_a_smooth_law():
 def by_formula(mu, **rest):
     """Friction by formula that holds a body at rest up to ``mu_s``."""
     return {"law": "formula", "mu": mu, "at_rest": "mu_s", **rest}
-
-
-@pytest.mark.slow
-def test_ratchet_by_formula_drifts_at_the_speed_of_closed_form():
-    amplitude, frequency, mu = 5.0, 0.5, 0.2
-    omega = 2.0 * np.pi * frequency
-    begin = np.arcsin(mu * 9.81 / amplitude) / omega
-    length = brentq(lambda s: _slide(s, begin, amplitude, omega, mu)[0], 0.1, 1.0 / frequency, xtol=1e-15)
-    run = outcome(conveyor(by_formula("mu_k*(2 - direction)", mu_s={"forward": mu, "backward": 3.0 * mu}, mu_k=mu)))
-    assert run.drift.item() == pytest.approx(_slide(length, begin, amplitude, omega, mu)[1] * frequency, rel=1e-10)
-    assert run.certified.item() == 1
 
 
 @pytest.mark.slow
