@@ -168,12 +168,6 @@ class TestRuns:
         np.testing.assert_allclose(stuck.velocity.where(stuck.velocity.notnull(), 0.1), 0.1, atol=1e-9)
         assert set(np.unique(compared["mode"])) <= {-1, 0, 1}
 
-    def test_outcome_has_a_line_for_each_law(self, compared):
-        lines = compared.attrs["outcome"].split("\n")
-        assert [line.split(":")[0] for line in lines] == LAWS
-        assert lines[0].startswith("coulomb: oscillatory")
-        assert lines[1].startswith("stiction: stick-slip")
-
     def test_saved_comparison_can_be_run_again_with_the_same_result(self, compared, tmp_path):
         netcdf.save(compared, tmp_path / "laws-run.nc")
         loaded = netcdf.load(tmp_path / "laws-run.nc")
@@ -235,17 +229,6 @@ class TestCommands:
         monkeypatch.chdir(tmp_path)
         (tmp_path / "laws.yaml").write_text(yaml.safe_dump(CONFIG))
         return tmp_path
-
-    def test_commands_run_map_and_info_accept_a_sweep_over_laws(self, folder, capsys):
-        assert main(["run", "laws.yaml"]) == 0
-        assert main(["run", "laws.yaml"]) == 0
-        assert main(["map", "laws.nc", "--sel", "friction.law=tustin"]) == 0
-        assert main(["info", "laws.nc"]) == 0
-        out, err = capsys.readouterr()
-        assert err == ""
-        assert "holds this sweep already" in out
-        assert "friction_law: coulomb, stiction, tustin\n" in out
-        assert (folder / "laws-friction-law-tustin.png").exists()
 
     @pytest.mark.slow
     def test_plot_draws_one_law_of_a_stored_run(self, folder, compared, capsys):

@@ -164,11 +164,6 @@ class TestCacheOnDisk:
 
         return cache.kernel(double)(np.float64(21.0))
 
-    def test_kernel_is_compiled_once(self, folder, caplog):
-        assert self.doubled() == self.doubled() == 42.0
-        assert caplog.text.count("compiling") == 1
-        assert len(list(folder.rglob("*.nb*"))) == 1
-
     @staticmethod
     def again(caplog):
         """Whether something is compiled from here on, as a function."""

@@ -427,19 +427,6 @@ class TestJumps:
             assert made(define(Definition(text, "mu_s")), w=0.3)
 
 
-class TestBand:
-    @pytest.mark.parametrize("text", ["mu_s*min(v/w, 1)", "mu_s*min(1, v/w)"])
-    def test_band_of_a_ramp_ends_where_the_ramp_does(self, text):
-        for w in np.geomspace(1e-6, 10.0, 30):
-            assert stiction_band(made(define(Definition(text)), w=w)) == pytest.approx(w, rel=3e-16)
-
-    def test_band_of_a_decaying_slope_ends_at_a_hundredth_of_the_steepest(self):
-        """The slope of v/(w + v) is w/(w + v)^2; that of tanh is 1 - tanh^2."""
-        assert stiction_band(made(define(Definition("mu_s*v/(w + v)")), w=0.01)) == pytest.approx(0.09, rel=1e-12)
-        law = made(define(Definition("mu_s*tanh(v/w)")), w=0.01)
-        assert stiction_band(law) == pytest.approx(0.01 * math.atanh(math.sqrt(0.99)), rel=1e-12)
-
-
 # ---- motion -----------------------------------------------------------------------------------
 
 RING = shape(0.076, 4.47e-5, 0.025, 0.01, 0.043378, zone="15 deg") | course("arctan", 2.0, span=2.0)

@@ -303,13 +303,6 @@ def test_regime_has_the_same_colour_in_every_figure():
             assert drawn_colours(figure, name) == {to_rgb(plots.REGIME_COLOURS[name])}
 
 
-def test_map_legend_lists_the_regimes_present_with_their_shares():
-    ds = make_sweep((10, 10))
-    ds["regime"][:] = 1
-    ds["regime"][0, 0] = 3
-    assert entries(plots.regime_map(ds)) == ["oscillatory, 99.0 %", "separating, 1.0 %"]
-
-
 def test_title_and_legend_of_a_map_can_be_replaced_and_left_out():
     for draw in (plots.regime_map, lambda ds, **options: plots.map_panel(ds, ax=panel(), **options).figure):
         titles = [title(draw(make_sweep(), **given)) for given in ({}, {"title": "my map"}, {"title": False})]

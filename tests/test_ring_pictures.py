@@ -171,12 +171,6 @@ class TestPolarView:
         ):
             refused(told, plots.polar_view, run, time, ax)
 
-    def test_polar_view_of_a_single_contact_has_one_ball_and_one_reaction(self, other, ax):
-        ds = other(model="ring-single-contact", body={"mass": 0.05}).drop_vars(["normal_2", "zone_2"])
-        plots.polar_view(ds, 1.0, ax)
-        assert sum(isinstance(patch, Circle) for patch in ax.patches) == 1
-        assert [len(begin) for begin, _ in arrows(ax)] == [1, 1, 1]
-
 
 class TestPhasePortrait:
     def test_portrait_shows_the_curves_of_ring_and_body(self, run, ax):

@@ -187,18 +187,6 @@ def test_intervals_cover_known_indices() -> None:
     assert (covered >= 88).all()
 
 
-def test_indices_agree_with_those_of_salib() -> None:
-    sobol = pytest.importorskip("SALib.analyze.sobol")
-    rows = ishigami(saltelli(unit_points("sobol", 1024, 6, 1, 0)))
-    # One replicate given eight times has its own indices.
-    first, total = sobol_indices(np.stack([sobol_sums(rows)] * 8), 1024)
-    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0, 1]] * 3}
-    theirs = sobol.analyze(problem, rows.ravel(), calc_second_order=False, num_resamples=2, seed=1)
-    # They divide by the variance of all rows.
-    assert first[0] == pytest.approx(np.clip(theirs["S1"], 0.0, 1.0), abs=0.02)
-    assert total[0] == pytest.approx(theirs["ST"], abs=0.02)
-
-
 @pytest.mark.parametrize("missing", [False, True])
 def test_indices_are_unknown_for_a_function_that_is_constant_or_has_gaps(missing: bool) -> None:
     rows = np.ones((8, 16, 4))
@@ -272,31 +260,6 @@ def test_indices_of_slip_by_a_time_are_those_of_runs_of_the_same_points() -> Non
         assert np.stack([one[f"first_slip_sobol_first{end}"] for end in ("", "_low", "_high")]) == pytest.approx(first)
         assert np.stack([one[f"first_slip_sobol_total{end}"] for end in ("", "_low", "_high")]) == pytest.approx(total)
     assert (ds.first_slip_sobol_first.sel(parameter="friction.mu_s") > 0.3).all()
-
-
-def test_probabilities_are_those_of_runs_of_the_same_points() -> None:
-    """An independent way: the points in a table, each run by a plain sweep, counted by numpy."""
-    of = {"friction.mu_k": {"uniform": [0.05, 0.1]}, "friction.mu_s": {"over": "mu_k", "uniform": [1.2, 2.0]}}
-    ds = run(config(of=of, grid={"belt.velocity": [0.05, 0.1]}, sensitivity=True, survival=[3.0]))
-    sample = load(config(of=of)).sample
-    assert sample is not None
-    rows = np.concatenate([saltelli(unit_points("sobol", 32, 4, 0, r)) for r in range(8)])
-    low, ratio = 0.05 + 0.05 * rows[..., 0], 1.2 + 0.8 * rows[..., 1]
-    columns = {"friction.mu_k": xr.DataArray(low.ravel(), dims="point")}
-    columns["friction.mu_s"] = xr.DataArray((low * ratio).ravel(), dims="point")
-    plain = ringsweep.sweep(BELT, {"belt.velocity": [0.05, 0.1], **columns}, jobs=1, progress=False)
-    regimes = plain.regime.transpose("belt_velocity", "point").values.reshape(2, 256, 4)
-    for k, word in enumerate(REGIMES):
-        mine = (regimes == k)[:, :, [0, 3]].mean(axis=(1, 2))
-        assert ds.probability.sel(word=word).values.tolist() == mine.tolist()
-        for cell in range(2):
-            of_parts = (regimes[cell] == k).astype(float).reshape(8, 32, 4)
-            first, _ = sobol_indices(np.stack([sobol_sums(one) for one in of_parts]), 32)
-            assert ds.sobol_first.sel(word=word).values[cell].tolist() == first[0].tolist()
-    slip = plain.first_slip.transpose("belt_velocity", "point").values.reshape(2, 256, 4)[:, :, [0, 3]]
-    assert ds.survival.values[:, 0].tolist() == (~(slip <= 3.0)).mean(axis=(1, 2)).tolist()
-    assert not np.isnan(ds.sobol_first.values).any()
-    assert not np.isnan(ds.sobol_total.values).any()
 
 
 def test_runs_without_certificate_count_both_ways_and_are_a_warning(caplog: pytest.LogCaptureFixture) -> None:

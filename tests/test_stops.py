@@ -40,17 +40,6 @@ def states(scene, times):
 class TestClosedForms:
     """Motions that are known piece by piece."""
 
-    def test_without_friction_each_rebound_takes_1_over_e_of_the_time_before(self):
-        e, length = 0.8, 3.0
-        scene = between(-1.0, 2.0, e, stiffness=0.0, start=(0.0, 1.0))
-        hits = 2.0 + length * np.cumsum(e ** -np.arange(1.0, 12.0))
-        found = states(scene, 0.5 * (hits[1:] + hits[:-1]))
-        numbers = np.arange(2.0, 12.0)
-        np.testing.assert_array_equal(found.impacts, numbers)
-        np.testing.assert_allclose(found.velocity_end, (-e) ** numbers, rtol=1e-12)
-        np.testing.assert_allclose(found.x_end, 0.5, atol=1e-11)
-        assert (found.certified == 1).all()
-
     def test_a_motion_between_stops_that_lose_nothing_returns_each_time(self):
         found = outcome(between(-1.0, 2.0, 1.0, stiffness=0.0, start=(0.0, 1.0), span=100.0))
         assert found.regime.attrs["flag_meanings"].split()[int(found.regime)] == "oscillatory"
@@ -313,16 +302,6 @@ class TestExponent:
         turned = [(found[f"multiplier_{k}"] * np.exp(1j * found[f"multiplier_angle_{k}"])).item() for k in (1, 2)]
         np.testing.assert_allclose(np.sort_complex(turned), np.sort_complex(exact), atol=1e-8)
         assert found.certified.item() == 1
-
-    def test_multipliers_of_an_impact_oscillator_multiply_to_its_losses(self):
-        """Three impacts in three periods of the force: e^6 exp(-c T/m)."""
-        e, c, period = 0.8, 0.04, 2.0 * pi / 2.6
-        scene = between(high=0.0, e=e, damping=c, force=(1.0, 1.0 / period), start=(-0.1, 0.0), span=400 * period)
-        found = with_exponent(scene, certify=True)
-        assert found.period.item() == pytest.approx(3.0 * period, rel=1e-12)
-        product = e**6 * np.exp(-c * 3.0 * period)
-        assert (found.multiplier_1 * found.multiplier_2).item() == pytest.approx(product, rel=1e-10)
-        assert found.multiplier_1.item() == pytest.approx(sqrt(product), rel=1e-9)
 
     def test_rest_at_a_stop_erases_the_past(self):
         scene = between(-0.1, 0.05, 0.4, mu_k=0.02, stiffness=2.0, velocity=0.25, force=(0.9, 0.25), span=400.0)

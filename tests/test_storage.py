@@ -142,13 +142,6 @@ def test_load_names_the_problem_of_a_file(tmp_path):
         refused(problem, netcdf.load, tmp_path / name)
 
 
-def test_truncated_file_is_reported_as_damaged(sweep, tmp_path):
-    netcdf.save(sweep, tmp_path / "out.nc")
-    whole = (tmp_path / "out.nc").read_bytes()
-    (tmp_path / "out.nc").write_bytes(whole[: len(whole) // 2])
-    refused("damaged", netcdf.load, tmp_path / "out.nc")
-
-
 def test_words_replace_flags_and_a_variable_without_flags_is_refused():
     flags = {"long_name": "regime", "flag_values": np.array([0, 3], "int8"), "flag_meanings": "resting separating"}
     told = ringsweep.words(xr.DataArray([[3, 0, 7]], dims=("a", "b"), attrs=flags))
