@@ -209,36 +209,8 @@ def test_law_tends_to_its_limit_with_the_power_of_theory(law, of, values, limit,
     np.testing.assert_allclose(np.diff(np.log(errors)) / np.diff(np.log(values)), power, atol=within)
 
 
-MILD = {
-    "bengisu-akay": {"v0": 0.01, "alpha": 100.0},
-    "karnopp": {"dead_band": 0.01},
-    "lugre": {"sigma0": 1e3, "sigma1": 30.0, "sigma2": 0.1, "v_s": 0.01},
-    "elasto-plastic": {"sigma0": 1e3, "sigma1": 30.0, "sigma2": 0.1, "v_s": 0.01},
-    "reset-integrator": {"sigma0": 1e3, "sigma1": 30.0},
-}
-
-
 class TestTwoMethods:
     """Methods agree where a constant step resolves the law; events set the order of its error."""
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize(("law", "error"), [("lugre", 1e-4), ("bengisu-akay", 1e-7), ("karnopp", 0.1)])
-    def test_auto_and_rk4_agree(self, law, error):
-        scene = belt(law, span=20.0, start=0.0, **MILD[law])
-        scene = with_all_parts(scene) if law == "lugre" else scene
-        found = outcome(scene)
-        # With a smooth law rk4 takes the belt without the parts that are 0, whose kernel other tests compile too.
-        parts = ("spring", "damper", "force") if law == "bengisu-akay" else ()
-        bare = {key: part for key, part in scene.items() if key not in parts} | {"spring": {"stiffness": 2.0}}
-        fixed = outcome(bare if parts else scene, method="rk4", steps=100_000)
-        assert fixed.stiffness < STABILITY_LIMIT
-        assert found.regime == fixed.regime
-        assert found.certified == fixed.certified == 1
-        for name in ("x_end", "x_max", "velocity_end"):
-            assert float(found[name]) == pytest.approx(float(fixed[name]), abs=error)
-        # A constant step leaves the dead band too late, by another time in each cycle.
-        if law != "karnopp":
-            assert float(found.period) == pytest.approx(float(fixed.period), abs=max(error, 2e-4))
 
     def test_error_of_lugre_falls_with_the_tolerance(self):
         """This holds also where the body begins to stick, and the Stribeck curve rises within 1/1000 of a step."""
@@ -382,23 +354,6 @@ class TestRegimes:
         assert float(found.period[2]) == pytest.approx(98.1, rel=0.25)
         np.testing.assert_allclose(found.period[1], found.period[2], rtol=1e-4)
         np.testing.assert_allclose(found.slips, (found.time_span - found.first_slip) // found.period[2] + 1, atol=1)
-
-    @pytest.mark.slow
-    def test_rk4_run_that_misses_the_first_stick_has_no_certificate(self):
-        scene = belt(span=30.0) | {"initial": {"x": 0.5}}
-        assert REGIMES[int(outcome(scene).regime)] == "stick-slip"
-        for steps in (500, 2000, 10_000):
-            fixed = outcome(scene, method="rk4", steps=steps)
-            assert REGIMES[int(fixed.regime)] == "oscillatory"
-            assert fixed.certified == 0
-
-    @pytest.mark.slow
-    def test_rk4_step_whose_stages_cross_zero_velocity_has_no_certificate(self):
-        scene = belt(v_b=0.45, mu_k=0.139, mu_s=0.2245, k=5.19, start=0.0, span=20.0)
-        fixed = outcome(scene, method="rk4", steps=20_000)
-        assert fixed.stiffness == np.inf
-        assert fixed.certified == 0
-        assert REGIMES[int(outcome(scene).regime)] == "stick-slip"
 
 
 class TestInput:

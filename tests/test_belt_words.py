@@ -87,16 +87,6 @@ class TestRounding:
             np.testing.assert_array_equal(rounded.stops_per_cycle, exact.stops_per_cycle)
             np.testing.assert_allclose(rounded.stick_share, exact.stick_share, atol=8.0 * share + 1e-3)
 
-    def test_body_that_sticks_two_fifths_of_the_time_is_in_stick_slip(self):
-        of = {"k": 100.0, "drive": (0.01, 3.4), "span": 50.0, **self.COULOMB}
-        rounded, exact = runs(scene("bengisu-akay", v0=0.003, **of), 50.0), runs(scene("tustin", **of), 50.0)
-        for found, share in ((rounded, 0.437), (exact, 0.407)):
-            assert words(found) == ["stick-slip"]
-            assert float(found.stick_share[0]) == pytest.approx(share, abs=1e-3)
-            assert float(found.stops_per_cycle[0]) == 2.0
-            # Two stops a cycle do not halve the period.
-            assert float(found.period[0]) == pytest.approx(1 / 3.4, rel=1e-12)
-
     @pytest.mark.parametrize("share", [1e-3, 1e-6])
     def test_motion_that_grazes_the_speed_of_the_belt_does_not_stop(self, share):
         found = runs(scene("threlfall", mu_k=0.1, v0=0.1 * share, belt=0.1), [40.0])
@@ -121,29 +111,6 @@ class TestSliding:
 
 class TestSpan:
     """Where the span ends does not matter."""
-
-    CASES: ClassVar = {
-        "bengisu-akay on an oscillating belt": scene(
-            "bengisu-akay", mu_s=0.5, mu_k=0.3, alpha=20.0, v0=0.03, k=100.0, drive=(0.5, 0.43)
-        ),
-        "slow belt": scene("bengisu-akay", mu_s=0.5, mu_k=0.3, alpha=100.0, v0=1e-5, x=0.3, k=100.0, belt=1e-3),
-        "stiction": scene("stiction", mu_s=0.15, mu_k=0.1, belt=0.1),
-        "coulomb": scene("coulomb", mu_k=0.1, belt=0.1),
-    }
-    SPANS: ClassVar = {
-        "bengisu-akay on an oscillating belt": [20.0, 21.0, 21.94, 60.0, 61.1],
-        "slow belt": [60.0, 90.0, 100.0, 400.0, 431.0],
-        "stiction": [40.0, 43.0, 45.1, 100.0, 103.3],
-        "coulomb": [20.0, 21.2, 22.1, 40.0, 41.7],
-    }
-
-    @pytest.mark.parametrize("case", mostly_slow(CASES, ("stiction",)))
-    def test_neither_word_nor_first_slip_depend_on_the_span(self, case):
-        found = runs(self.CASES[case], self.SPANS[case])
-        assert len(set(words(found))) == 1
-        np.testing.assert_allclose(found.first_slip, found.first_slip[0], rtol=1e-7)
-        assert found.settled[-2:].all()
-        np.testing.assert_allclose(found.period[-1], found.period[-2], rtol=1e-5)
 
     @pytest.mark.slow
     @pytest.mark.parametrize("law", ["tustin", "bengisu-akay"])
@@ -187,24 +154,6 @@ class TestPeriod:
         assert words(found) == ["sliding"] * 2
         assert found.period.isnull().all()
         assert found.settled.values.tolist() == [0, 1]
-
-
-@pytest.mark.slow
-def test_rk4_has_the_words_and_numbers_of_located_steps():
-    rng = np.random.default_rng(11)
-    of = scene("bengisu-akay", mu_s=0.2, mu_k=0.15, alpha=10.0, v0=0.02, drive=(0.1, 0.3), span=60.0)
-    axes = {
-        "drive.amplitude": xr.DataArray(rng.uniform(0.1, 2.0, 8), dims="case"),
-        "spring.stiffness": xr.DataArray(rng.uniform(1.0, 8.0, 8), dims="case"),
-    }
-    located = ringsweep.sweep(of, axes, progress=False)
-    fixed = ringsweep.sweep(of, axes, solver={"method": "rk4", "steps": 60_000}, progress=False)
-    assert (fixed.certified == 1).all()
-    assert words(fixed) == words(located)
-    for name in ("period", "stops_per_cycle", "settled"):
-        np.testing.assert_allclose(fixed[name], located[name], rtol=1e-3)
-    np.testing.assert_allclose(fixed.stick_share, located.stick_share, atol=5e-3)
-    np.testing.assert_allclose(fixed.x_max, located.x_max, rtol=1e-6)
 
 
 @pytest.mark.slow

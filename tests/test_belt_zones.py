@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 from belts import on_belt, outcome, with_exponent
 from refusals import refused
-from scipy.integrate import solve_ivp
 from solutions import period_map
 from test_functions_of_time import cells_of
 from tiers import mostly_slow
@@ -34,62 +33,6 @@ def on_bristles(law, frame, zones=((0.1, 0.12, 0.25, 0.2), (-0.2, 0.05, 0.5, 0.4
         for place in (scene["friction"]["elsewhere"], *scene["zones"]):
             del place["mu_s"]
     return scene
-
-
-def by_scipy_on_bristles(scene):
-    """Displacement and velocity at the end of a motion on LuGre or Dahl bristles, by SciPy from edge to edge."""
-    own, velocity = scene["friction"], scene["belt"]["velocity"]
-    period = scene["belt"].get("period", 1e3)
-    shift = velocity if own["frame"] == "belt" else 0.0
-    s0, s1, s2 = (own.get(f"sigma{i}", 0.0) / G for i in range(3))
-    edges = np.sort(
-        [zone["center"] + side * zone["half_length"] + n * period for zone in scene["zones"] for side in (-1, 1)
-         for n in range(-9, 10)]
-    )  # fmt: skip
-
-    def under(place):
-        found = own["elsewhere"]
-        for zone in scene["zones"]:
-            found = (
-                zone
-                if abs((place - zone["center"] + period / 2) % period - period / 2) < zone["half_length"]
-                else found
-            )
-        return found.get("mu_s", found["mu_k"]), found["mu_k"]
-
-    t, span, y = (
-        0.0,
-        scene["time"]["span"],
-        np.array([scene["initial"]["x"], scene["initial"]["velocity"] - velocity, 0.0]),
-    )
-    segment = np.searchsorted(edges, y[0])
-    while t < span:
-        low, high = edges[segment - 1], edges[segment]
-        mu_s, mu_k = under(0.5 * (low + high))
-
-        def rates(t, y, mu_s=mu_s, mu_k=mu_k):
-            x, v, z = y
-            g = mu_k + (mu_s - mu_k) * np.exp(-((v / own["v_s"]) ** 2)) if "v_s" in own else mu_k
-            rate = v - s0 * abs(v) * z / g
-            force = scene["force"]["amplitude"] * np.sin(2.0 * np.pi * scene["force"]["frequency"] * t)
-            pull = force - scene["spring"]["stiffness"] * x - G * (s0 * z + s1 * rate + s2 * v)
-            return v + velocity, pull, rate
-
-        def above(t, y, high=high):
-            return high - y[0] + shift * t
-
-        def below(t, y, low=low):
-            return y[0] - shift * t - low
-
-        above.terminal, above.direction, below.terminal, below.direction = True, -1, True, -1
-        part = solve_ivp(rates, (t, span), y, "DOP853", rtol=1e-12, atol=1e-13, max_step=0.02, events=(above, below))
-        t, y = part.t[-1], part.y[:, -1]
-        if part.status == 1:
-            side = 1 if len(part.t_events[0]) else -1
-            segment += side
-            # Exactly on the edge: the next part does not cross it again.
-            y[0] = (high if side > 0 else low) + shift * t
-    return y[0], y[1] + velocity
 
 
 def where_it_stops(energy, low, high, period, rough, rest):
@@ -134,27 +77,6 @@ def test_a_patch_of_the_whole_period_is_no_patch(law):
     for name in names:
         assert one[name].values == pytest.approx(none[name].values, rel=share, abs=share)
     assert (one.regime == none.regime).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("law", "frame"), [("lugre", "belt"), ("dahl", "space")])
-def test_bristles_over_patches_move_as_an_integration_from_edge_to_edge(law, frame):
-    rng, cells = np.random.default_rng(53), 20
-    axes = {
-        "initial.x": rng.uniform(-0.3, 0.3, cells),
-        "initial.velocity": rng.uniform(-2.0, 2.0, cells),
-        "belt.velocity": rng.uniform(0.05, 0.6, cells) * rng.choice([-1.0, 1.0], cells),
-        "zones.0.half_length": rng.uniform(0.03, 0.15, cells),
-    }
-    scene = on_bristles(law, frame, start=(0.0, 0.0))
-    columns = {path: xr.DataArray(column, dims="cell") for path, column in axes.items()}
-    run = ringsweep.sweep(scene, columns, solver={"method": "implicit", "rtol": 1e-10}, progress=False)
-    assert run.certified.all()
-    for i, (x, velocity, belt, half) in enumerate(zip(*axes.values(), strict=True)):
-        moved = scene | {"initial": {"x": x, "velocity": velocity}, "belt": scene["belt"] | {"velocity": belt}}
-        moved["zones"] = [scene["zones"][0] | {"half_length": half}, scene["zones"][1]]
-        ends = [run.x_end.values[i], run.velocity_end.values[i]]
-        assert ends == pytest.approx(by_scipy_on_bristles(moved), abs=1e-8)
 
 
 @pytest.mark.slow
@@ -238,23 +160,6 @@ def test_a_large_ring_near_its_bottom_is_a_belt():
     }
     belt = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), period=2.0 * np.pi * radius, start=(0.0, 1.5), span=1.0)
     assert outcome(ring).phi_end.item() * radius == pytest.approx(outcome(belt).x_end.item(), rel=1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("law", "frame"), [("bengisu-akay", "belt"), ("bengisu-akay", "space"), ("lugre", "belt")])
-def test_rk4_and_events_agree(law, frame):
-    rest = {"stiffness": 8.0, "force": (3.0, 0.4), "start": (0.1, 0.3)}
-    zones = [(0.2, 0.15, 0.6, 0.3), (-0.3, 0.1, 0.1, 0.05)]
-    scene = with_zones(zones, (0.4, 0.25), frame, 1.3, law, **rest)
-    own = {"alpha": 10.0, "v0": 0.02} if law == "bengisu-akay" else {"sigma0": 1000.0, "sigma1": 5.0, "v_s": 0.05}
-    scene["friction"] |= own
-    axes = {"belt.velocity": np.linspace(0.05, 0.5, 6)}
-    run, coarse = (
-        ringsweep.sweep(scene, axes, solver=solver, progress=False)
-        for solver in ("auto", {"method": "rk4", "steps": 100_000})
-    )
-    assert run.certified.all()
-    assert np.allclose(coarse.x_end, run.x_end, rtol=0.0, atol=1e-5)
 
 
 def test_history_tells_the_zone_and_the_edges():

@@ -263,32 +263,6 @@ class TestMethods:
         assert run.certified.item() == 1
 
     @pytest.mark.slow
-    def test_event_and_implicit_and_rk4_agree_without_friction(self):
-        scene = forced(c=0.2, cubic=3.0, x=0.5, force={"amplitude": 1.5, "frequency": 0.3, "constant": 0.2})
-        exact = end(scene, EXACT)
-        smooth = scene | {"friction": forced("bengisu-akay")["friction"]}
-        np.testing.assert_allclose(end(scene), exact, atol=1e-9)
-        np.testing.assert_allclose(end(smooth, {"method": "implicit", "rtol": 1e-6}), exact, atol=1e-8)
-        coarse = [outcome(scene, {"method": "rk4", "steps": steps}) for steps in (800, 1600, 3200)]
-        errors = [abs(float(one.x_end) - exact[0]) for one in coarse]
-        np.testing.assert_allclose(np.diff(np.log2(errors)), -4.0, atol=0.3)
-
-    @pytest.mark.slow
-    def test_rk4_takes_the_force_of_a_table(self):
-        scene = everything(np.random.default_rng(2), table=True)
-        scene["friction"] |= {"mu_s": 0.0, "mu_k": 0.0}
-        solver = {"method": "rk4", "steps": 6000, "certify": False}
-        np.testing.assert_allclose(end(scene, solver), end(scene, EXACT), atol=1e-9)
-
-    @pytest.mark.slow
-    def test_bristles_agree_between_implicit_and_rk4_with_all_parts(self):
-        scene = everything(np.random.default_rng(7), "lugre")
-        scene["friction"] |= {"sigma0": 300.0, "sigma1": 10.0, "sigma2": 0.1, "v_s": 0.05, "mu_s": 0.4, "mu_k": 0.3}
-        tight = end(scene, {"method": "implicit", "rtol": 1e-9})
-        np.testing.assert_allclose(end(scene), tight, atol=1e-5)
-        np.testing.assert_allclose(end(scene, SMALL_STEPS), tight, atol=1e-6)
-
-    @pytest.mark.slow
     @pytest.mark.parametrize(("part", "expected"), [({"c": 50.0}, 50.0), ({"cubic": 600.0, "x": 1.0}, sqrt(1801.0))])
     def test_rk4_counts_damper_and_cubic_spring_in_the_stiffness(self, part, expected):
         """Eigenvalues are about c/m, and sqrt((k + 3 cubic x^2)/m). The belt is faster than the body."""

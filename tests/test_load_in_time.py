@@ -78,23 +78,6 @@ def test_a_constant_load_is_more_gravity():
         assert run[name].item() == pytest.approx(other[name].item(), rel=1e-11)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "friction",
-    [
-        {"law": "bengisu-akay", "mu_s": 0.3, "mu_k": 0.2, "alpha": 10.0, "v0": 0.01},
-        {"law": "lugre", "mu_s": 0.3, "mu_k": 0.2, "sigma0": 1e3, "sigma1": 10.0, "v_s": 0.05},
-    ],
-)
-@pytest.mark.parametrize("amplitude", [4.0, 12.0])
-def test_rk4_and_events_agree(friction, amplitude):
-    scene = braked(pulsating(amplitude, 0.7), friction, stiffness=20.0, velocity=0.1)
-    run, coarse = outcome(scene), outcome(scene, method="rk4", steps=40000)
-    assert run.regime.item() == coarse.regime.item()
-    for name in ("t_end", "x_end", "x_max"):
-        assert run[name].item() == pytest.approx(coarse[name].item(), abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("load", "words"),
     [

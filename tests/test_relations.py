@@ -230,6 +230,26 @@ class TestLaunch:
             np.testing.assert_allclose(found[greatest][lost], other[greatest][lost], rtol=1e-6)
 
 
+#: Kinds under laws that a constant step resolves in most cells.
+RESOLVED = (
+    *("belt-smooth", "belt-lugre", "belt-zones-smooth", "belt-zones-bristles", "belt-two-way-smooth"),
+    *("belt-jumps-smooth", "ring-smooth", "ring-dahl"),
+)
+
+#: Numbers of a run that hang on no instant of its steps.
+ENDS = {f"{name}_{at}" for name in ("x", "velocity", "phi", "omega") for at in ("end", "min", "max")} | {"t_separation"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RESOLVED)
+def test_constant_steps_end_where_located_steps_do(name):
+    run = relations.random_scenes(KINDS[name], 40, np.random.default_rng(48))
+    first, second = run.outcomes(), run.outcomes(solver={"method": "rk4", "steps": 40_000})
+    assert relations.sure(first, second).sum() > 20
+    ends = ENDS if KINDS[name].law in BRISTLES else ENDS | {"regime", "motion"}
+    assert not relations.differing(first, second).keys() & ends
+
+
 class TestSweeps:
     """The way in which cells are swept does not matter."""
 

@@ -76,29 +76,6 @@ class TestLimit:
         assert order(sigma0, abs(found.t_separation - exact.t_separation)) == pytest.approx(-1.0, abs=0.02)
         assert order(sigma0, abs(found.phi_end - exact.phi_end)) == pytest.approx(-1.0, abs=0.02)
 
-    def test_reversal_differs_from_coulomb_in_first_order_of_the_compliance(self, dahl, rigid):
-        """At a reversal the bristles move over a distance proportional to 1/sigma0."""
-        sigma0 = 10.0 ** np.arange(4, 9)
-        exact, found = solve(LIMIT, rigid(LAUNCH)), solve(EXACT, dahl(LAUNCH, sigma0))
-        assert order(sigma0, abs(found.phi_max - exact.phi_max)) == pytest.approx(-1.0, abs=0.02)
-        assert order(sigma0, abs(found.phi_end - exact.phi_end)) == pytest.approx(-1.0, abs=0.1)
-
-
-class TestMethods:
-    """Methods agree at a stiffness that a constant step resolves."""
-
-    @pytest.mark.parametrize("scene", [LAUNCH, {**DRIVEN_OFF, "time.span": 1.0}], ids=["launched", "driven"])
-    def test_implicit_and_rk4_agree(self, dahl, history, scene):
-        batch = dahl(scene, MILD)
-        found, run = solve(EXACT, batch), history(batch, 200_000, "dahl")
-        assert run.t[-1] == found.t_end
-        assert found.phi_end == pytest.approx(run.phi[-1], abs=1e-6)
-        assert found.phi_max == pytest.approx(run.phi.max(), abs=1e-6)
-        assert found.omega_end == pytest.approx(run.omega[-1], abs=1e-4)
-        assert found.normal_min_1 == pytest.approx(run.normal_1.min(), rel=1e-3)
-        assert found.normal_min_2 == pytest.approx(run.normal_2.min(), rel=1e-3)
-        assert found.stick_time == pytest.approx(np.diff(run.t)[run.mode[:-1] == 0].sum(), abs=1e-3)
-
 
 class TestEnergy:
     """On a ring at rest friction dissipates energy."""

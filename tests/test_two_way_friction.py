@@ -129,15 +129,6 @@ def test_two_contacts_share_a_pull_as_the_friction_of_its_way_does():
     assert abs((both + apart) * mu_2 * run.normal_2 - (both - apart) * mu_1 * run.normal_1).max() < 1e-10
 
 
-@pytest.mark.slow
-def test_rk4_and_events_agree_under_a_smooth_law():
-    friction = two_way((0.4, 0.3), (0.25, 0.1), "bengisu-akay", alpha=10.0, v0=0.05)
-    scene = conveyor(friction, stiffness=8.0, velocity=0.2, force=(3.0, 0.4), start=(0.1, 0.3), span=6.0)
-    run, coarse = outcome(scene), outcome(scene, method="rk4", steps=60000)
-    assert run.x_end.item() == pytest.approx(coarse.x_end.item(), abs=1e-6)
-    assert run.certified.item() == 1
-
-
 def by_formula(mu, **rest):
     """Friction by formula that holds a body at rest up to ``mu_s``."""
     return {"law": "formula", "mu": mu, "at_rest": "mu_s", **rest}
