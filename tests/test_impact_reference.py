@@ -1,4 +1,4 @@
-"""The reference of ``benchmarks.brute_force`` after a lost contact, which knows nothing of the package."""
+"""The reference of ``benchmarks.brute_force``, most of it after a lost contact; it knows nothing of the package."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 from rings import bump, course, rubs, shape
 from scipy.integrate import solve_ivp
 
-from benchmarks.reference import go_on, rattling
+from benchmarks.reference import compliant, go_on, rattling
 from benchmarks.reference.aftermath import MOST_EVENTS
 from benchmarks.reference.free import impact
 from benchmarks.reference.problem import problem
@@ -131,3 +131,14 @@ def test_springs_that_hit_later_part_only_in_the_impact_of_both_contacts():
 
     assert rattling.why_apart(problem(SHARED), log[0, 0], rigid, log) == rattling.SHARED
     assert 0.59 < asked[-1] < 0.671
+
+
+def test_springs_do_not_end_at_the_reactions_of_a_step_that_they_reject():
+    """Friction of bristles turns 1e4 times as fast as the springs ring: the first step that is tried is too long."""
+    mass, phi, omega = 2e5, 1.15, 94.7
+    friction = rubs("lugre", rest=(0.48, 0.26), sigma0=4e3, sigma1=3e4, sigma2=0.0, v_s=0.0125)
+    course_ = course("sinusoidal", 0.94, 476.0, -1.537, phi=phi, omega=omega, span=0.1)
+    p = problem(shape(mass, 3.3e-4, 0.043, 0.0145, 0.065) | friction | course_ | {"gravity": 9.81})
+    load, until = 23.0 * mass * p.gravity, 1e-10
+    found = compliant.follow(p, (0.0, phi, omega, 0.0, 0.0, load, load, 0.0), 0.0, until, 1e18, 1.0)
+    assert found["t"] == until

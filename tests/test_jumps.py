@@ -6,7 +6,6 @@ from math import atan2, copysign, cos, exp, floor, pi, sin, sqrt
 
 import numpy as np
 import pytest
-import xarray as xr
 from test_functions_of_time import belt, by, cells_of
 
 import ringsweep
@@ -67,46 +66,6 @@ def test_body_keeps_its_velocity_where_that_of_the_belt_jumps():
     assert float(run.x_end) == pytest.approx(0.4 * (1.5 - slip) + 0.5 * 0.2 * G * slip**2, abs=1e-10)
     # The instant of the jump has a row on either side.
     assert run["mode"].values[run.time.values == 0.5].tolist() == [0, -1]
-
-
-@pytest.mark.slow
-def test_pulses_move_a_body_as_the_closed_form_says():
-    rng = np.random.default_rng(6)
-    low, high = [1, 0, 1, 0.5, 0, 0.05, -0.5, -1], [20, 1, 5, 3, 1, 0.3, 0.5, 1]
-    k, c, A, T, d, static, x, v = rng.uniform(low, high, (12, 8)).T
-    span = 9.0
-    force = {"formula": "piecewise(t/T - floor(t/T) < d, A, 0)", "A": 1.0, "T": 1.0, "d": 0.5}
-    scene = belt(None, force, {"law": "stiction", "mu_s": 0.3, "mu_k": 0.2}) | {"damper": {"coefficient": 0.1}}
-    scene |= {"initial": {"x": 0.0, "velocity": 0.0}, "time": {"span": span}}
-    axes = {"force.A": A, "force.T": T, "force.d": d, "spring.stiffness": k, "damper.coefficient": c}
-    axes |= {"friction.mu_s": static, "friction.mu_k": 0.6 * static, "initial.x": x, "initial.velocity": v}
-    runs = ringsweep.sweep(scene, {path: xr.DataArray(values, dims="run") for path, values in axes.items()})
-    for i in range(12):
-        place, velocity = x[i], v[i]
-        turns = [(n + share) * T[i] for n in range(20) for share in (0.0, d[i])]
-        for t, end in pairwise([*(t for t in turns if t < span), span]):
-            F = A[i] if (0.5 * (t + end) / T[i]) % 1.0 < d[i] else 0.0
-            limits = {"static": static[i] * G, "kinetic": 0.6 * static[i] * G}
-            place, velocity = moved(place, velocity, F, end - t, k=k[i], c=c[i], **limits)
-        assert runs.certified[i] == 1
-        np.testing.assert_allclose([runs.x_end[i], runs.velocity_end[i]], [place, velocity], atol=1e-8)
-
-
-@pytest.mark.slow
-def test_steps_of_a_table_move_a_body_as_the_closed_form_says():
-    times, samples = [0.0, 0.7, 1.9, 2.0, 3.3, 4.8, 6.0], [1.0, -3.0, 2.5, 0.0, 4.0, -2.0, 9.0]
-    force = {"time": times, "force": samples, "interpolate": "step", "amplitude": 1.3}
-    scene = belt(None, force, {"law": "stiction", "mu_s": 0.12, "mu_k": 0.06}) | {"damper": {"coefficient": 0.3}}
-    run = ringsweep.simulate(scene | {"initial": {"x": 0.2, "velocity": 0.4}}, samples=40)
-    x, v = 0.2, 0.4
-    for (t, end), sample in zip(pairwise(times), samples, strict=False):
-        x, v = moved(x, v, 1.3 * sample, end - t, k=4.0, c=0.3, static=0.12 * G, kinetic=0.06 * G)
-        inside = (run.time.values > t) & (run.time.values < end)
-        assert (run.force.values[inside] == 1.3 * sample).all()
-        # A row with a jump is there before and after it.
-        assert {*run.force.values[run.time.values == end][:2]} >= {1.3 * sample}
-    assert run.certified == 1
-    np.testing.assert_allclose([run.x_end, run.velocity_end], [x, v], atol=1e-9)
 
 
 def test_steps_of_a_table_are_the_formula_that_jumps_there():
