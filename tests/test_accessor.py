@@ -24,15 +24,6 @@ def ds(scene):
     return ringsweep.sweep(scene, {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["5 deg", "15 deg"]})
 
 
-@pytest.mark.slow
-def test_words_and_boundary_are_those_of_the_functions(ds):
-    xr.testing.assert_identical(ds.ringsweep.words(), ringsweep.words(ds.regime))
-    xr.testing.assert_identical(ds.ringsweep.words("certified"), ringsweep.words(ds.certified))
-    xr.testing.assert_identical(
-        ds.ringsweep.boundary("separating", 1e-2), ringsweep.boundary(ds, "separating", tolerance=1e-2)
-    )
-
-
 def test_where_keeps_the_cells_of_classes_and_refuses_unknown_words(ds):
     lost = ds.ringsweep.where(regime="separating", certified="certified")
     inside = (ringsweep.words(ds.regime) == "separating") & (ds.certified == 1)

@@ -529,14 +529,6 @@ class TestNarrowFeatures:
         found = outcome(launched(friction) | {"time": {"span": 0.05}}, {"method": "rk4", "steps": 10})
         assert found["certified"] == 0
 
-    def test_run_fails_if_and_only_if_it_meets_negative_friction(self):
-        dip = {"w": 0.005, "a": 0, "b": -0.25, "c": 0}
-        friction = {"law": "formula", "mu": self.PEAKS, "at_rest": "mu_s"} | dip
-        assert outcome(launched(friction | {"vb": 0.31}))["regime"] == FAILED
-        below = outcome(launched(friction | {"vb": 0.6}))
-        assert below["regime"] != FAILED
-        assert below["certified"] == 1
-
 
 @pytest.mark.slow
 class TestMotion:
@@ -687,14 +679,6 @@ class TestTable:
         assert float(abs(holds["x_end"] - 0.2)) == 0.0
         rising = table([0.0, 0.1, 1.0], [0.0, 0.4, 0.3])
         assert outcome(belt(rising, velocity=0.0, span=5.0, **still))["x_end"] < 0.199
-
-    @pytest.mark.slow
-    def test_table_from_a_file_stands_in_the_stored_configuration(self, tmp_path):
-        (tmp_path / "mu_v.csv").write_text("v,mu\n0,0.4\n0.1,0.3\n1,0.25\n")
-        config = {"scene": belt({"law": "table", "file": str(tmp_path / "mu_v.csv")})}
-        found = ringsweep.run(config)
-        stored = json.loads(found.attrs["configuration"])["scene"]["friction"]
-        assert stored == {"law": "table", "v": [0.0, 0.1, 1.0], "mu": [0.4, 0.3, 0.25], "scale": 1.0}
 
     @pytest.mark.parametrize(
         ("friction", "problem"),

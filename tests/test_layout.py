@@ -1,6 +1,5 @@
 """Order of the cells of a sweep, and division into tasks."""
 
-import math
 from threading import Event
 
 import numpy as np
@@ -8,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsweep.runs.task_sizes import TaskSizes, divide_into_tasks
-from ringsweep.storage.chunks import CHUNK, Layout
+from ringsweep.storage.chunks import Layout
 
 
 class FinishedTask:
@@ -40,22 +39,6 @@ def test_every_cell_has_one_position_and_lies_in_its_chunk(sizes, data):
         assert end - begin == here.sum()
     assert after == layout.total
     assert (seen == 1).all()
-
-
-@given(sizes=st.lists(st.integers(1, 300), min_size=1, max_size=5))
-def test_chunk_is_not_larger_than_allowed_and_not_needlessly_small(sizes):
-    chunk = Layout(sizes).chunk
-    assert math.prod(chunk) <= CHUNK
-    assert all(1 <= edge <= size for edge, size in zip(chunk, sizes, strict=True))
-    if math.prod(sizes) > CHUNK:
-        assert math.prod(chunk) > CHUNK / 4
-
-
-def test_map_of_a_sweep_over_five_axes_reads_few_chunks():
-    layout = Layout([25] * 5)
-    chunks = [place for _, _, place in layout.chunks()]
-    passed = sum(all(place[dim].start <= 12 < place[dim].stop for dim in (1, 2, 4)) for place in chunks)
-    assert passed * math.prod(layout.chunk) < 0.06 * layout.total
 
 
 class TestTaskSizes:

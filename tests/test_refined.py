@@ -60,15 +60,6 @@ def stored(monkeypatch):
 
 
 class TestFile:
-    @pytest.mark.slow
-    def test_computed_cells_equal_those_of_the_full_grid_bit_for_bit(self, ds, full):
-        run = ds.origin.values != INFERRED
-        assert 0.1 < run.mean() < 0.6
-        with xr.open_dataset(full, decode_times=False) as whole:
-            for name in whole.data_vars:
-                expected = whole[name].values[run]
-                assert ds[name].values[run].astype(expected.dtype).tobytes() == expected.tobytes(), name
-
     def test_inferred_labels_differ_from_the_full_grid_within_the_bound(self, ds, full):
         wrong = np.zeros(ds.regime.shape, dtype=bool)
         with xr.open_dataset(full, decode_times=False) as whole:
@@ -94,19 +85,6 @@ class TestFile:
         assert ds.attrs["audit_corrected"] >= ds.attrs["audit_wrong_before"]
         assert 0.0 < ds.attrs["audit_bound"] < 0.2
         assert "at 95 % confidence" in ds.attrs["audit"]
-
-    @pytest.mark.slow
-    def test_further_axis_makes_a_stack_of_refined_maps(self, scene):
-        axes = {"zone.half_angle": AXES["zone.half_angle"], "friction.law": ["tustin", "stiction"]}
-        axes["drive.amplitude"] = AXES["drive.amplitude"]
-        both = scene | {"friction": scene["friction"] | {"alpha": 10.0}}
-        found = ringsweep.sweep(both, axes, refine=REFINE | {"audit": 0.0}, progress=False)
-        alone = ringsweep.sweep(
-            scene, {name: axes[name] for name in axes if name != "friction.law"}, refine=REFINE | {"audit": 0.0}
-        )
-        assert found.regime.dims == ("zone_half_angle", "friction_law", "drive_amplitude")
-        for name in ("regime", "motion", "separating_contact", "origin", "t_end"):
-            np.testing.assert_array_equal(found[name].sel(friction_law="stiction"), alone[name])
 
     def test_info_and_map_tell_the_audit(self, refined, ds, capsys, tmp_path):
         assert cli.main(["info", str(refined)]) == 0
