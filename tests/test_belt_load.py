@@ -1,11 +1,10 @@
 """The belt whose normal load grows with the displacement, N = m g + k_n x, against closed forms and SciPy."""
 
-from math import acos, atan2, copysign, pi, sqrt
+from math import acos, atan2, pi, sqrt
 
 import numpy as np
 import pytest
 from belts import on_belt, outcome
-from scipy.integrate import solve_ivp
 
 import ringsweep
 from ringsweep.quantities.flags import REGIMES
@@ -149,46 +148,3 @@ class TestSeparation:
         assert word(lost) == "separating"
         grazing = outcome(scene(v_b=-50.0, start=(far, 0.0), span=0.9 * 2 * pi * sqrt(M / stiffness)))
         assert (held.certified, lost.certified, grazing.certified) == (1, 1, 0)
-
-
-class TestOtherIntegrators:
-    """A smooth law in SciPy, written down here again."""
-
-    FRICTION = {"v0": 0.05, "alpha": 5.0}  # noqa: RUF012
-
-    def rates(self, v_b, growth):
-        def mu(v):
-            if abs(v) < 0.05:
-                return 0.4 * (1.0 - (1.0 - abs(v) / 0.05) ** 2)
-            return 0.25 * (1.0 + (0.4 / 0.25 - 1.0) * np.exp(-5.0 * (abs(v) - 0.05)))
-
-        def found(t, y):
-            v = y[1] - v_b
-            return y[1], (-K * y[0] - copysign(mu(v), v) * (M * G + growth * y[0])) / M
-
-        return found
-
-    @pytest.mark.parametrize("solver", [{"method": "implicit", "rtol": 1e-9}, SMALL_STEPS])
-    def test_end_of_a_run_agrees(self, solver):
-        start, v_b, growth = (0.2, 1.5), 0.3, 12.0
-        found = outcome(scene("bengisu-akay", growth=growth, v_b=v_b, start=start, span=8.0, **self.FRICTION), solver)
-        tight = {"rtol": 1e-11, "atol": 1e-12, "max_step": 1e-2}
-        end = solve_ivp(self.rates(v_b, growth), (0.0, 8.0), start, method="DOP853", **tight).y[:, -1]
-        np.testing.assert_allclose([found.x_end, found.velocity_end], end, atol=3e-6)
-        assert found.certified == 1
-
-    def test_bristles_carry_the_varying_load(self):
-        """Dahl's bristles: force sigma0 z (m g + k_n x)/(m g)."""
-        sigma0, mu_k, growth, v_b = 300.0, 0.25, 12.0, 0.3
-
-        def rates(t, y):
-            x, velocity, z = y
-            v, per_load = velocity - v_b, sigma0 / (M * G)
-            rate = v - per_load * abs(v) * z / mu_k
-            return velocity, (-K * x - per_load * z * (M * G + growth * x)) / M, rate
-
-        found = scene("dahl", growth=growth, v_b=v_b, start=(0.2, 1.5), span=5.0)
-        found["friction"] = {"law": "dahl", "mu_k": mu_k, "sigma0": sigma0}
-        end = solve_ivp(rates, (0.0, 5.0), (0.2, 1.5, 0.0), method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-        result = outcome(found, {"method": "implicit", "rtol": 1e-9})
-        np.testing.assert_allclose([result.x_end, result.velocity_end], end[:2], atol=1e-5)

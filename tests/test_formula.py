@@ -417,15 +417,6 @@ class TestJumps:
         with pytest.raises(InputError, match=r"jumps up from 0\.25 to 0\.3 "):
             ringsweep.sweep(scene, {"friction.a": [0.8, 1.0, 1.2]}, progress=False)
 
-    def test_kink_and_downward_jump_are_accepted(self):
-        for text in (
-            "piecewise(v < w, mu_s, mu_k)",
-            "piecewise(v < w, mu_s - mu_s*v/(2*w), 0.1*mu_s*v/w + 0.4*mu_s)",
-            "max(mu_k, mu_s - mu_s*((v - w)/(0.1*w))**2)",
-            "piecewise(v < w, mu_k*(v/w + (1 - v/w))/3*3, mu_k)",
-        ):
-            assert made(define(Definition(text, "mu_s")), w=0.3)
-
 
 # ---- motion -----------------------------------------------------------------------------------
 

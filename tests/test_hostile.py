@@ -1,5 +1,5 @@
-"""Attacks in a short version: damaged files, faults of the disk, two writers. test_survival.py kills, and
-test_hostile_configurations.py makes configurations."""
+"""Attacks in a short version: random configurations, damaged files, faults of the disk, two writers; test_survival
+kills."""
 
 import subprocess
 import sys
@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.hostile.__main__ import PARTS
+from benchmarks.hostile import configurations as hostile
+from benchmarks.hostile.__main__ import PARTS, SEED
 
 pytestmark = pytest.mark.slow
 
@@ -26,3 +27,10 @@ def test_short_attacks_find_nothing():
     assert "everything held" in found.stdout
     for part in parts:
         assert f"{part}: " in found.stdout
+
+
+def test_random_configurations_are_refused_in_one_line_or_stay_finite(tmp_path):
+    report = hostile.configurations(tmp_path, 50, SEED, hostile.COMMON)
+    assert not report.broken
+    assert report.counts["run: all cells have a regime"] > 10
+    assert report.counts["run: exit status 2"] > 10

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from itertools import pairwise
 from math import exp, inf, log, nextafter
 from typing import Any, NamedTuple
 
@@ -283,28 +282,6 @@ class TestRegions:
             width = next((parameters[key] for key in ("v0", "v_t", "dead_band") if key in parameters), 0.0)
             if name != "andersson":
                 assert stiction_band(law) == (3 * width if name == "tanh" else width), name
-
-    @some
-    @given(smooth)
-    def test_friction_of_a_smooth_law_is_continuous(self, laws):
-        for found in laws:
-            for (one, (_, edge)), other in pairwise([*regions(found.law).items(), None]):
-                if other is None or edge == inf:
-                    continue
-                below, above = (friction_in(found.law, region, edge, (MU_S, MU_K)) for region in (one, other[0]))
-                # Where a region is steep, rounding of the edge changes friction.
-                jump = max(3e-17 / found.length, 1e-14) + np.spacing(edge) * (abs(below[1]) + abs(above[1]))
-                assert above[0] == pytest.approx(below[0], abs=jump), found
-
-    @some
-    @given(every, st.floats(0.0, 100.0))
-    def test_friction_lies_between_0_and_mu_s_and_above_mu_k_outside_the_band(self, laws, relative):
-        for found in laws:
-            speed = relative * found.length
-            value = mu(found.law, speed)
-            assert -1e-15 <= value <= MU_S * (1 + 1e-13)
-            if speed >= stiction_band(found.law) and found.name not in ("tanh", "andersson", "brown-mcphee"):
-                assert value >= MU_K * (1 - 1e-13)
 
 
 @given(alphas)

@@ -233,7 +233,7 @@ class TestLaunch:
 #: Kinds under laws that a constant step resolves in most cells.
 RESOLVED = (
     *("belt-smooth", "belt-lugre", "belt-zones-smooth", "belt-zones-bristles", "belt-two-way-smooth"),
-    *("belt-jumps-smooth", "ring-smooth", "ring-dahl"),
+    *("belt-jumps-smooth", "belt-dahl", "ring-smooth", "ring-dahl"),
 )
 
 #: Numbers of a run that hang on no instant of its steps.

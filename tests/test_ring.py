@@ -11,7 +11,7 @@ from solutions import ball, rod
 
 from ringsweep.compile import take
 from ringsweep.physics import ring
-from ringsweep.physics.ring import acceleration, acceleration_slope, reactions
+from ringsweep.physics.ring import acceleration, reactions
 
 angles = st.floats(-20.0, 20.0)
 friction_ratios = st.floats(-1.2, 1.2)
@@ -214,21 +214,6 @@ class TestDerivedFunctions:
         assert by_phi == pytest.approx(acceleration(body, K1, K2, (*turned, omega))[0].imag / 1e-30, rel=1e-9)
         gain = acceleration(body, tiny, tiny, at)[0].imag / 1e-30
         assert ring.friction_gain(body, at) == pytest.approx(gain, rel=1e-9, abs=1e-9)
-
-
-class TestSlope:
-    """Derivative of the acceleration by way of friction, from which the stiffness of a step is computed."""
-
-    @given(states(), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
-    def test_acceleration_slope_is_the_derivative_of_the_acceleration(self, state, slope_1, slope_2):
-        body, K1, K2, phi, omega = state
-        where = (sin(phi), cos(phi), omega)
-        tiny = 1e-40j
-        complex_step = acceleration(body, K1 + tiny * slope_1, K2 + tiny * slope_2, where)[0].imag / 1e-40
-        slope = acceleration_slope(body, K1, K2, slope_1, slope_2, where)
-        epsilon, determinant = acceleration(body, K1, K2, where)
-        scale = (abs(epsilon) + body.gravity / body.radius + omega**2) * body.mass * body.radius**2 / abs(determinant)
-        assert abs(slope - complex_step) < 1e-12 * scale * (1 + body.mass * body.radius**2 / abs(determinant))
 
 
 class TestOneContact:

@@ -1,16 +1,15 @@
 """Power series within a step: first root, sign changes, sums and bounds."""
 
-from math import exp, factorial, inf, pi
+from math import exp, inf
 
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from ringsweep.compile import inlined, kernel
+from ringsweep.compile import kernel
 from ringsweep.numerics.series import ORDER, STACK, ascending, crossings, first_root, slope, step_size, value, variation
-from ringsweep.numerics.swing import swing
-from ringsweep.numerics.terms import COLUMNS, FACTOR_ROWS, PRODUCTS, inner_products, no_factors, set_factors
+from ringsweep.numerics.terms import COLUMNS
 
 K = np.arange(ORDER + 1)
 
@@ -49,36 +48,6 @@ def noise(c, s):
 def sums_in_kernel(c, s):
     """Value, slope and variation of a series, from vector lanes."""
     return value(c, s), slope(c, s), variation(c, s)
-
-
-@kernel
-def roots_in_kernel(rows, h, work, roots):
-    """Fill `roots` with the first root of each series, or with `h`."""
-    for i in range(len(roots)):
-        roots[i] = first_root(rows[i], h, work)[0]
-
-
-@kernel
-def swing_in_kernel(rows, factors):
-    """Fill rows 0 to 3 with the series of a swing, see `swing`."""
-    swing(rows[0], rows[1], rows[2], rows[3], (factors[0], factors[1], factors[2], factors[3], factors[4]))
-
-
-@kernel
-def products_in_kernel(c, left, right):
-    """Fill `c` with products of series that grow side by side: row i is the product of rows i of `left` and `right`."""
-    first = newest = no_factors(eight(left, 0))
-    for k in range(1, ORDER + 1):
-        inner = inner_products(c, PRODUCTS, k, first, newest)
-        for i in range(PRODUCTS):
-            c[i, k] = inner[i] + left[i, 0] * right[i, k] + left[i, k] * right[i, 0]
-        newest = set_factors(c, PRODUCTS, k, eight(left, k), eight(right, k))
-        first = newest if k == 1 else first
-
-
-@inlined
-def eight(rows, k):
-    return rows[0, k], rows[1, k], rows[2, k], rows[3, k], rows[4, k], rows[5, k], rows[6, k], rows[7, k]
 
 
 coefficients = st.lists(st.floats(-10, 10), min_size=1, max_size=ORDER)
@@ -193,44 +162,3 @@ class TestSums:
         assert (h / r) ** ORDER < t
         assert step_size(0.0, 0.0) == inf
         assert step_size(exp(-ORDER), 0.0) == pytest.approx(exp(1.0))
-
-
-def test_products_that_grow_side_by_side_agree_with_numpy():
-    left, right = np.random.default_rng(16).normal(size=(2, PRODUCTS, ORDER + 1))
-    expected = np.array([np.convolve(a, b)[1 : ORDER + 1] for a, b in zip(left, right, strict=True)])
-    # Numbers of an earlier step must not count.
-    c = np.full((PRODUCTS + FACTOR_ROWS, COLUMNS), np.nan)
-    products_in_kernel(c, left, right)
-    np.testing.assert_allclose(c[:PRODUCTS, 1 : ORDER + 1], expected, atol=1e-13)
-
-
-def test_kernels_and_python_find_the_same_first_roots():
-    rng = np.random.default_rng(54)
-    # Waves of up to three periods in a step: some have no root, some have several.
-    rate, phase, lift = rng.uniform(1.0, 6.0 * pi, 200), rng.uniform(0.0, 2.0 * pi, 200), rng.uniform(0.9, 2.0, 200)
-    powers = np.array([np.cos(phase + 0.5 * pi * k) * rate**k / factorial(k) for k in range(ORDER + 1)]).T
-    rows = np.zeros((200, COLUMNS))
-    rows[:, : ORDER + 1] = powers
-    rows[:, 0] += lift
-    work, found = np.empty((STACK, COLUMNS)), np.empty(200)
-    roots_in_kernel(rows, 1.0, work, found)
-    expected = np.array([first(row, 1.0)[0] for row in rows])
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
-    assert 20 < (found == 1.0).sum() < 180
-
-
-def test_series_of_a_swing_obey_its_equation_and_a_pendulum_keeps_energy():
-    factors = np.array([0.3, -1.1, 0.4, 0.2, 0.1])
-    for pendulum in (False, True):
-        rows = np.zeros((4, COLUMNS))
-        rows[:3, 0] = 0.7, np.sin(0.5), np.cos(0.5)
-        swing_in_kernel(rows, np.array([0.0, -1.0, 0.0, 0.0, 0.0]) if pendulum else factors)
-        omega, sine, cosine, square = rows[:, : ORDER + 1]
-        np.testing.assert_allclose(np.convolve(omega, omega)[: ORDER + 1], square, atol=1e-14)
-        np.testing.assert_allclose(np.convolve(omega, cosine)[:ORDER], K[1:] * sine[1:], atol=1e-14)
-        if pendulum:
-            np.testing.assert_allclose((0.5 * square - cosine)[1:], 0.0, atol=1e-15)
-        else:
-            acceleration = np.tensordot(factors[1:], [sine, cosine, omega, square], 1)
-            acceleration[0] += factors[0]
-            np.testing.assert_allclose(acceleration[:-1], K[1:] * omega[1:], atol=1e-14)

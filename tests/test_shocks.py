@@ -60,12 +60,6 @@ class TestParticle:
         assert changes[gaps == 0.0].max(initial=0.0) <= float(found.jump_max) * (1 + 1e-9)
         assert changes.max() == pytest.approx(float(found.jump_max), rel=0.05)
 
-    def test_greatest_reaction_is_that_of_the_history(self, found, history):
-        reaction = MASS * (G * np.cos(history.phi) + RADIUS * history.omega**2)
-        assert float(found.normal_max_1) >= float(reaction.max()) * (1 - 1e-12)
-        assert float(found.normal_max_1) == pytest.approx(float(reaction.max()), rel=1e-5)
-        assert "normal_max_2" not in found
-
     @pytest.mark.slow
     def test_constant_steps_do_not_locate_jumps(self, found):
         by_steps = one(
