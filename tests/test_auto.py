@@ -1,6 +1,6 @@
 """The default method: its certificate, and parameters at the ends of their ranges."""
 
-from math import acos, pi, sqrt
+from math import acos, sqrt
 
 import numpy as np
 import pytest
@@ -11,7 +11,6 @@ from solutions import Fall, solve
 from ringsweep.compile import take
 from ringsweep.models.ring.record import Outcome
 from ringsweep.quantities.flags import COARSE, FAILED, NO_RESULT, NOT_ASKED, OSCILLATORY, REVOLVING, SEPARATING
-from ringsweep.solvers import event
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
@@ -67,50 +66,10 @@ class TestCertificate:
         assert (found.regime, found.separating_contact) == (SEPARATING, 2)
         assert found.certified
 
-    @pytest.fixture
-    def calls(self, monkeypatch):
-        """Tolerance and number of cells of every integration."""
-        recorded = []
-
-        def spy(batch, tolerances, *rest, integrate=event.integrate):
-            recorded.append((tolerances[0], len(batch.span)))
-            return integrate(batch, tolerances, *rest)
-
-        monkeypatch.setattr(event, "integrate", spy)
-        return recorded
-
-    @pytest.fixture
-    def launches(self, cells):
-        return cells(
-            {"initial.omega": np.linspace(5, 60, 200), "drive.amplitude": 5.0, "time.span": 3.0},
-            law="stiction",
-            drive="arctan",
-        )
-
-    def test_cells_whose_tolerances_disagree_run_again_at_tighter_tolerances(self, calls, launches):
-        """At a very loose tolerance some regimes differ; the cells that are certified later have the right regime."""
-        loose = Event(rtol=1e-2)
-        first, second = (solve(Event(rtol=rtol, certify=False), launches) for rtol in (1e-2, 0.3))
-        disagree = (kinds(first) != kinds(second)).any(axis=0)
-        calls.clear()
-        found = solve(loose, launches)
-        assert 0 < disagree.sum() < 200
-        # Cells that violate their law, or whose error could change the regime, are run again too.
-        assert [cells for _, cells in calls[:2]] == [200, 200]
-        assert disagree.sum() <= calls[2][1] < 200
-        tolerances = [tolerance for tolerance, _ in calls]
-        assert tolerances == pytest.approx([1e-2, 0.3, *(1e-2 * 30.0**-k for k in range(1, len(calls) - 1))])
-        right = kinds(solve(Event(), launches))
-        certified_later = disagree & found.certified
-        assert certified_later.any()
-        np.testing.assert_array_equal(kinds(found)[:, certified_later], right[:, certified_later])
-        assert (found.steps[disagree] > first.steps[disagree] + second.steps[disagree]).all()
-
-    def test_no_certificate_is_given_with_certify_false(self, calls, launches):
-        found = solve(Auto(certify=False), launches)
+    def test_no_certificate_is_given_with_certify_false(self, scenes):
+        found = solve(Auto(certify=False), scenes({"drive.amplitude": np.array([2.0, 5.0])}))
         assert not found.certified.any()
         assert (found.because == NOT_ASKED).all()
-        assert len(calls) == 1
 
     def test_run_that_reaches_max_steps_is_failed_without_certificate(self, scenes, law):
         method = Event(max_steps=10) if law == "stiction" else Implicit(max_steps=10)
@@ -193,20 +152,6 @@ class TestBody:
             assert found.phi_min[i] == pytest.approx(-acos(cosine), abs=1e-7)
             assert found.reversals[i] == int(10.0 / period * 2 + 0.5)
         assert found.certified.all()
-
-    def test_launch_at_10000_radians_per_second_agrees_with_closed_forms(self, scenes, law):
-        """The body slips for more than three turns until a contact separates, so that stiction does not matter."""
-        omega = np.array([1e4, -1e4])
-        scene = scenes({"initial.omega": omega, "drive.amplitude": 0.0})
-        method = Event(rtol=1e-12) if law == "stiction" else Implicit(rtol=1e-9)
-        found = solve(method, scene)
-        for i, w in enumerate(omega):
-            fall = Fall(take(scene.body, i), 0.0, RIG["zone.half_angle"], (0.5, 0.3), (0.2, 0.1))
-            phi, contact, _ = fall.run(0.0, w)
-            assert abs(phi) > 6 * pi
-            assert found.separating_contact[i] == contact
-            assert found.phi_end[i] == pytest.approx(phi, abs=1e-8)
-            assert found.motion[i] == REVOLVING
 
     @pytest.mark.slow
     def test_launch_at_exactly_the_ring_velocity_agrees_with_nearby_launches(self, scenes):

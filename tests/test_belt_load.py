@@ -96,11 +96,6 @@ class TestSeparation:
         if solver is None:
             assert found.certified == 1
 
-    def test_body_without_a_load_at_launch_separates_at_once(self):
-        found = outcome(scene(start=(-2.0, 0.0)))
-        assert word(found) == "separating"
-        assert float(found.t_end) == 0.0
-
     @pytest.mark.parametrize("start", [None, (0.0, 0.5), (0.0, 0.05)])
     @pytest.mark.parametrize(
         ("law", "growth"),

@@ -90,10 +90,6 @@ def test_edit_changes_the_digests_of_what_depends_on_it(package, results, kernel
         assert [one != other for one, other in zip(before, after, strict=True)] == [results, kernels], name
 
 
-def test_digest_is_that_of_the_sources_wherever_they_are(package):
-    assert sources_digest(package) == sources_digest(PACKAGE)
-
-
 def test_kernels_take_nothing_but_flags_and_declarations_from_quantities():
     """Names, units and messages are no numbers of a kernel."""
     declarations = {"Key", "Leaf", "MASSES", "OUTCOMES", "Parameter", "Variable", "declared", "show"}
@@ -105,12 +101,6 @@ def test_kernels_take_nothing_but_flags_and_declarations_from_quantities():
                 if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("ringsweep.quantities"):
                     taken = {name.name for name in node.names}
                     assert node.module == "ringsweep.quantities.flags" or taken <= declarations, path
-
-
-def test_new_file_of_a_law_changes_the_digest_of_sources(package):
-    before = sources_digest(package)
-    (package / "physics" / "friction" / "new.py").write_text("")
-    assert sources_digest(package) != before
 
 
 def test_pipe_in_place_of_an_own_file_is_refused_before_it_is_waited_for(package, tmp_path):

@@ -191,28 +191,21 @@ AMPLITUDES = "drive.amplitude: {geomspace: [0.1, 10, 5]}"
 BAD_LINES = {
     "unknown key": ("ring: {radius:", "ring: {radus:", "scene.ring.radus", 4, "did you mean `radius`?"),
     "unknown section": ("  time:", "  tme:", "scene.tme", 16, "did you mean `time`?"),
-    "unknown law": ("bengisu-akay", "bengisu", "scene.friction.law", 6, "did you mean `bengisu-akay`?"),
     "missing key": ("    v0: 2.0e-6\n", "", "scene.friction.v0", 5, "missing: half-width of the stiction band"),
     "wrong unit": ("0.076 kg", "0.076 m", "scene.body.mass", 3, "is in kg"),
     "degrees taken for radians": ("15 deg", "15", "scene.zone.half_angle", 12, "was `15 deg` meant?"),
     "negative mass": ("0.076 kg", "-76 g", "scene.body.mass", 3, "must be greater than 0 kg"),
     "kinetic beyond static": ("mu_k: 0.1", "mu_k: 0.4", "scene.friction.rest.mu_k", 8, "0.4 exceeds mu_s"),
     "ring too small": ("43.378 mm", "35 mm", "scene.ring.radius", 4, "too small"),
-    "not a number": ("0.076 kg", ".nan", "scene.body.mass", 3, "not finite"),
-    "a section that is none": ("{span: 10}", "10", "scene.time", 16, "a section is expected"),
     "given twice": ("    alpha: 1.0e5", "    v0: 1.0e5", "scene.friction.v0", 10, "given twice"),
     "a tag": ("0.076 kg", "!!python/object:os.system x", "scene.body.mass", 3, "tag"),
     "axis of nothing": ("amplitude: {", "amplitud: {", "sweep.grid.drive.amplitud", 20, "`drive.amplitude`"),
     "axis value out of its interval": ("[2 deg, 0.5]", "[2 deg, 60]", "sweep.grid.zone.half_angle.1", 21, "60 deg"),
     "geomspace from zero": ("[0.1, 10, 5]", "[0, 10, 5]", "sweep.grid.drive.amplitude.geomspace", 20, "greater than 0"),
-    "fractional count": ("[0.1, 10, 5]", "[1, 10, 5.5]", "sweep.grid.drive.amplitude.geomspace.2", 20, "whole number"),
-    "unknown option": ("steps: 1000", "stps: 1000", "solver.stps", 17, "did you mean `steps`?"),
-    "no steps": (", steps: 1000", "", "solver.steps", 17, "missing"),
     "key of many levels in one": ("time: {span: 10}", "time.span: 10", "scene.time.span", 16, "unknown key"),
     "one cell": (AMPLITUDES, "friction.rest.mu_s: [0.5, 0]", "scene.friction.rest.mu_k", 8, "in a cell"),
     "decimal comma": ("0.076 kg", "0,076 kg", "scene.body.076 kg", 3, "unknown key: a comma ends a value"),
     "no file": ("law: arctan", "law: table\n    file: no.csv", "scene.drive.file", 15, "no.csv cannot be"),
-    "thousands of digits": ("amplitude: 2.0", f"amplitude: {'1' * 5000}", "scene.drive.amplitude", 15, "characters"),
 }
 
 
@@ -292,12 +285,6 @@ class TestLimits:
         inner = []
         inner.append(inner)
         assert "nested too deeply" in refusal(load, {"scene": inner}).problem
-
-    def test_integer_of_thousands_of_digits_is_refused_with_its_path(self):
-        digits = "1" * 5000
-        assert refusal(load, {"scene": edited(drive__amplitude=10**5000)}).path == "scene.drive.amplitude"
-        for setting in (f"drive.amplitude={digits}", f"zones.{digits}.center=1", f"{digits}=1"):
-            assert len(str(refusal(with_values, {"scene": SCENE}, [setting]))) < 2000
 
     @pytest.mark.parametrize(
         "wrong",

@@ -25,13 +25,3 @@ def test_no_line_of_prose_begins_with_a_mark(path):
 def test_every_kept_figure_has_a_reader():
     named = set().union(*(documents.used(path.read_text()) for path in DOCUMENTS))
     assert named == set(documents.kept())
-
-
-def test_figures_and_tables_are_filled_in():
-    figures = {("speed", "rate"): "70 000", ("speed", "all"): "| a |\n| --- |\n| 1 |\n"}
-    text = "<!-- speed.rate -->1<!-- / --> runs.\n\n<!-- speed.all -->\n<!-- / -->\n"
-    new = documents.filled(text, figures)
-    assert new == (
-        "<!-- speed.rate -->70 000<!-- / --> runs.\n\n<!-- speed.all -->\n\n| a |\n| --- |\n| 1 |\n\n<!-- / -->\n"
-    )
-    assert documents.filled(new, figures) == new

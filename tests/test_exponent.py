@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from belts import on_belt, with_all_parts, with_exponent
 from refusals import refused
-from solutions import growth, period_map
+from solutions import growth
 
 import ringsweep
 
@@ -140,33 +139,6 @@ def test_steady_sliding_loses_its_stability_at_half_the_logarithm_of_ten():
     np.testing.assert_allclose(found.lyapunov, exact, atol=1e-3)
     slower = run(FREE | {"time": {"span": 200.0}}, {**points, "belt.velocity": speed - 0.1})
     assert np.sign(slower.lyapunov.values).tolist() == [1.0, -1.0, -1.0]
-
-
-@pytest.mark.slow
-def test_multipliers_with_bristles_that_let_go():
-    """The reset integrator jumps at breakaway and at each reversal."""
-    law = {"law": "reset-integrator", "mu_s": 0.35, "mu_k": 0.25, "sigma0": 5.0, "sigma1": 0.4}
-    scene = on_belt(
-        law, damping=0.05, velocity=0.2, gravity=1.0, force=(0.3, 0.125, "90 deg"), start=(0.1,), span=1200.0
-    )
-    found = run(scene, certify=True)
-
-    def ends(spans, **initial):
-        points = {"time.span": spans} | {f"initial.{name}": values for name, values in initial.items()}
-        axes = {path: xr.DataArray(values, dims="run") for path, values in points.items()}
-        tight = {"method": "implicit", "rtol": 1e-11, "certify": False}
-        last = ringsweep.sweep(with_all_parts(scene), axes, solver=tight, progress=False)
-        return np.array([last.x_end, last.velocity_end, last.deflection_end])
-
-    def one_period(at):
-        return ends(np.full(6, 8.0), x=at[0], velocity=at[1], deflection=at[2])
-
-    multipliers = np.linalg.eigvals(period_map(one_period, ends([480.0]), 1e-5))
-    first, second, third = np.sort(np.abs(multipliers))[::-1]
-    assert found.certified.item() == 1
-    assert found.multiplier_1.item() == pytest.approx(first, rel=1e-5)
-    assert found.multiplier_2.item() == pytest.approx(second, rel=1e-5)
-    assert third < 1e-8
 
 
 @pytest.mark.slow

@@ -18,7 +18,6 @@ from hypothesis import assume, example, given, reject, settings
 from hypothesis import strategies as st
 from rings import course, rubs, shape
 from scipy.integrate import solve_ivp
-from scipy.interpolate import PchipInterpolator
 from solutions import cell_of, made, motion
 
 import ringsweep
@@ -628,16 +627,6 @@ def table(v=SPEEDS, mu=None, **more):
 
 
 class TestTable:
-    @pytest.mark.slow
-    def test_table_of_a_formula_moves_a_body_as_the_formula_does(self):
-        found = outcome(belt(table()))
-        known = outcome(belt(LEINE | {"mu_s": 0.4}))
-        assert found["certified"] == 1
-        assert found["regime"] == known["regime"]
-        v = np.linspace(0.0, 0.5, 20001)
-        off = np.abs(PchipInterpolator(SPEEDS, 0.4 / (1 + 3 * SPEEDS))(v) - 0.4 / (1 + 3 * v)).max()
-        assert float(abs(found["x_max"] - known["x_max"])) < 20 * off
-
     def test_friction_is_monotone_between_the_data_and_constant_beyond(self):
         mu = np.array([0.5, 0.3, 0.29, 0.29, 0.4, 0.41])
         v = np.array([0.0, 0.1, 0.2, 0.5, 0.6, 3.0])

@@ -69,15 +69,6 @@ def test_the_table_of_a_load_has_a_factor():
     refused(r"body\.load\.time: missing: a table needs a file", cells_of, braked({"amplitude": 2.0}))
 
 
-@pytest.mark.slow
-def test_a_constant_load_is_more_gravity():
-    run = outcome(braked({"time": [0, 10], "load": [4, 4]}, velocity=0.4, span=9.0))
-    heavy = on_belt({"law": "stiction", "mu_s": 0.3, "mu_k": 0.2}, 2.0, velocity=0.4, span=9.0, gravity=13.81)
-    other = outcome(heavy)
-    for name in ("first_slip", "x_end", "velocity_end", "x_max", "stick_time", "force_max"):
-        assert run[name].item() == pytest.approx(other[name].item(), rel=1e-11)
-
-
 @pytest.mark.parametrize(
     ("load", "words"),
     [

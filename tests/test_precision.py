@@ -77,17 +77,6 @@ class TestDataset:
         for name in ("regime_wrong", "flagged"):
             assert found[name].dtype == found[name].attrs["flag_values"].dtype == np.int8
 
-    def test_cells_have_their_swept_values_as_coordinates(self, found, config):
-        axes = load(config).axes.columns
-        grid = np.meshgrid(*(values for _, values in axes.values()), indexing="ij")
-        for name, values in zip(("drive_amplitude", "zone_half_angle"), grid, strict=True):
-            np.testing.assert_array_equal(found[name], values.ravel()[found["cell"]])
-
-    def test_contenders_are_rk4_and_the_method_of_auto_with_its_default(self, found):
-        assert set(found["method"].values) == {"event", "rk4"}
-        assert found.attrs["configured"] == "method: event, rtol: 1e-10"
-        assert found.attrs["configured"] in found["solver"].values
-
 
 class TestErrors:
     def test_errors_of_event_fall_with_rtol_to_rounding(self, found):

@@ -147,11 +147,6 @@ class TestAudit:
         np.testing.assert_array_equal(found.origin, again.origin)
         assert (found.origin != other.origin).any()
 
-    def test_bound_without_a_wrong_cell_is_three_over_the_sample(self):
-        found, _ = refined(np.zeros((SIZE, SIZE), dtype=int))
-        assert found.audit.wrong == found.audit.corrected == 0
-        assert found.audit.bound == pytest.approx(3 / found.audit.cells, rel=0.02)
-
     def test_island_that_the_audit_meets_is_followed_to_its_shore(self):
         truth = np.zeros((SIZE, SIZE), dtype=int)
         truth[100:120, 130:150] = 1

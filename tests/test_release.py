@@ -8,13 +8,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from belts import on_belt
 
 from ringsweep import cli
-from ringsweep.config import load, with_values
+from ringsweep.config import load
 from ringsweep.physics import PAPER
 from ringsweep.physics.friction import LAWS, TRAITS
-from ringsweep.storage.provenance import references
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -81,11 +79,3 @@ def test_source_of_a_law_is_on_the_page_of_references(law):
         author, year = source.partition(",")[0].removesuffix(" et al."), re.search(r"\((\d{4})\)", source)
         assert author in row
         assert year[1] in row
-
-
-def test_file_cites_its_own_model_and_law():
-    belt = on_belt({"law": "tustin", "mu_s": 0.15, "mu_k": 0.1, "alpha": 1.0}, 2.0, velocity=0.1, span=1.0)
-    cited = references(with_values({"scene": belt}))
-    assert "Tustin" in cited
-    assert "Popp" in cited
-    assert PAPER not in cited

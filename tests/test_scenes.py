@@ -21,11 +21,6 @@ def code(tmp_path_factory: pytest.TempPathFactory):
     return scenes.in_child(scenes.codes, (LEANEST, CUT), "rk4", cache=cache)
 
 
-def test_calls_by_name_and_by_address_are_found_in_assembly_code():
-    text = "\tmovabsq\t$exp, %rax\n\tcallq\t*%rax\n\tcallq\tatan@PLT\n\t.globl\tlog\n_exponent:\n"
-    assert scenes.code_of(text) == {"instructions": 3, "calls": ["exp", "atan"]}
-
-
 @pytest.mark.slow
 def test_kernel_calls_only_functions_that_its_scene_uses(code):
     assert code[LEANEST]["calls"] == []

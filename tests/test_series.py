@@ -114,12 +114,6 @@ class TestFirstRoot:
         assert found
         assert s == pytest.approx(where, abs=1e-7)
 
-    @given(st.floats(-100, 100).map(lambda e: 10.0**e), st.floats(0.01, 0.99))
-    def test_first_root_does_not_depend_on_the_unit(self, unit, where):
-        plain, scaled = first(from_roots([where, 1.5]), 1.0), first(from_roots([where, 1.5], unit), 1.0)
-        assert plain[1] == scaled[1] == 1
-        assert scaled[0] == pytest.approx(plain[0], rel=1e-14)
-
 
 class TestCrossings:
     @settings(max_examples=200)
