@@ -23,8 +23,7 @@ import numpy as np
 from benchmarks.rows import RING, ZONES
 from ringsweep import config
 from ringsweep.models import batch, model_of
-from ringsweep.runs import cells, contenders, sweep
-from ringsweep.runs.executors import Execution
+from ringsweep.runs import cells, contenders
 from ringsweep.solvers.method import Result
 
 #: Environment variable with the core to which a benchmark is pinned while others run beside it.
@@ -84,11 +83,6 @@ def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
     names = model_of(structure).columns(structure)
     run = bare(configuration)
     return lambda: dict(zip(names, run().rows.T, strict=True))
-
-
-def on_all_cores(configuration: Any) -> Any:
-    """Run a configuration as a sweep on all cores; returns its dataset."""
-    return sweep.compute(configuration, Execution(progress=False))
 
 
 def cores() -> list[int]:
