@@ -88,16 +88,21 @@ def gap_response(body, K, phi, omega):
     return base, np.array([np.array(contact_accelerations(body, free + c, omega))[:, 0] - base for c in columns]).T
 
 
-def growth(ends, state, weight, periods, distance):
+def growth(runs, points, names, weight, periods, distance):
     """Logarithms of the growth of a disturbance in each period, of shape ``(periods, cells)``.
 
-    Neighbouring runs are brought together again after each period. `ends` returns the states of all runs after a period
-    from their states before it, of shape ``(2, runs)``; a length counts `weight` times as much as a velocity.
+    Neighbouring runs are brought together again after each period. `runs` returns the outcomes of columns of values by
+    path, and `points` are those of one period; `names` are those of place and velocity. A length counts `weight` times
+    as much as a velocity.
     """
-    cells, found = state.shape[1], []
+    paths = [f"initial.{name}" for name in names]
+    state, found = np.array([points[path] for path in paths], dtype=float), []
+    cells = state.shape[1]
     apart = np.array([np.full(cells, distance), np.zeros(cells)])
     for _ in range(periods):
-        both = ends(np.hstack([state, state + apart]))
+        both = {path: np.tile(column, 2) for path, column in points.items()}
+        last = runs(both | dict(zip(paths, np.hstack([state, state + apart]), strict=True)))
+        both = np.array([last[f"{name}_end"].values for name in names])
         state, apart = both[:, :cells], both[:, cells:] - both[:, :cells]
         length = np.hypot(apart[0] * weight, apart[1])
         found.append(np.log(length / distance))
@@ -106,7 +111,10 @@ def growth(ends, state, weight, periods, distance):
 
 
 def period_map(ends, state, distance):
-    """Matrix of the derivative of the map of one period at a state, by differences; `ends` as in :func:`growth`."""
+    """Matrix of the derivative of the map of one period at a state, by differences.
+
+    `ends` returns the states of all runs after a period from their states before it.
+    """
     steps = distance * np.eye(len(state))
     one, other = np.split(ends(np.reshape(state, (-1, 1)) + np.hstack([steps, -steps])), 2, axis=1)
     return (one - other) / (2.0 * distance)

@@ -155,9 +155,6 @@ class TestAHistoryAtOtherTimes:
     def test_wrong_times_are_refused(self, run, times, problem):
         refused(problem, run.ringsweep.at, times)
 
-    def test_sweep_is_no_history(self):
-        refused("no time history", xr.Dataset().ringsweep.at, 1.0)
-
 
 def test_dataset_in_place_of_a_scene_is_refused_with_what_to_call(ds):
     refused(r"got a dataset: ds\.ringsweep\.simulate", ringsweep.simulate, ds)

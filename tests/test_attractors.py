@@ -101,15 +101,6 @@ class TestShares:
         assert 0.3 < self.spread(found, np.pi * 0.09) < 1.5
 
 
-@pytest.mark.slow
-def test_labels_draw_a_map():
-    i, j = np.indices((128, 128)) / 128
-    x = np.where(i**2 + j**2 < 0.5, 1.0, 0.0)[..., None] * np.ones(4)
-    found = ringsweep.attractors(sections(x, dims=("initial_x", "initial_velocity")))
-    figure = ringsweep.plots.regime_map(found, var="attractor")
-    assert any("motion 1" in text.get_text() for text in figure.findobj(match=lambda a: hasattr(a, "get_text")))
-
-
 def test_a_sweep_without_a_section_is_refused():
     refused("record", ringsweep.attractors, xr.Dataset({"regime": ("a", [1])}))
     refused("tolerance", ringsweep.attractors, sections([[1.0]]), tolerance=0.0)

@@ -153,25 +153,6 @@ class TestBody:
             assert found.reversals[i] == int(10.0 / period * 2 + 0.5)
         assert found.certified.all()
 
-    @pytest.mark.slow
-    def test_launch_at_exactly_the_ring_velocity_agrees_with_nearby_launches(self, scenes):
-        """The neighbours are slower and faster by 1e-9. A power law with exponent 1 moves at once."""
-        rate = np.array([5.0, -5.0])
-        slow, same, fast = (
-            solve(
-                Auto(),
-                scenes(
-                    {"initial.omega": rate * factor, "drive.amplitude": rate, "drive.exponent": 1.0, "time.span": 1.0},
-                    drive="power",
-                ),
-            )
-            for factor in (1 - 1e-9, 1.0, 1 + 1e-9)
-        )
-        for other in (slow, fast):
-            np.testing.assert_array_equal(kinds(same), kinds(other))
-            np.testing.assert_allclose(same.phi_end, other.phi_end, atol=1e-6)
-        assert (same.stick_time > 0.01).all()
-
 
 class TestTime:
     @pytest.mark.slow

@@ -176,19 +176,6 @@ class TestDeclaration:
         with pytest.raises(ValueError, match="do not determine phi_dd and the reactions for these numbers"):
             ring.completed(loose(1.0, 1.0, 9.81, 0.0, 5.0, np.array([0.5, 0.0])))
 
-    @pytest.mark.parametrize(
-        ("balances", "offset", "message"),
-        [
-            ("N1 = mass*gravity", "", "balances is one text"),
-            (("N1 == mass*gravity", "mass*phi_dd = K1*N1"), "", "with one `=`"),
-            (("N1 = mass*press", "mass*phi_dd = K1*N1"), "pres", "offset names the field pres, which does not exist"),
-            (("N1 = mass*gravty", "mass*phi_dd = K1*N1"), "", r"did you mean gravity\? \(known: K1, N1, cos_phi"),
-        ],
-    )
-    def test_slip_of_the_pen_is_told(self, balances, offset, message):
-        with pytest.raises(TypeError, match=message):
-            ring.body(balances=balances, energy="0.5*mass*omega**2", offset=offset)(Sledge)
-
     @pytest.mark.parametrize("name", ["epsilon", "F2", "one", "slope_1", "square", "omega", "K2"])
     def test_field_with_the_name_of_a_symbol_is_refused(self, name):
         cls = NamedTuple("Named", [(field, Any) for field in (*Sledge._fields, name)])

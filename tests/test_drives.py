@@ -149,13 +149,6 @@ class TestTable:
             found = [shape(course, t)[0] for t in np.linspace(KNOTS[k], KNOTS[k + 1], 20)]
             assert min(before, after) - 1e-12 <= min(found) <= max(found) <= max(before, after) + 1e-12
 
-    @given(st.lists(st.floats(-3, 3), min_size=len(KNOTS), max_size=len(KNOTS)))
-    def test_velocity_of_a_monotone_table_is_continuous(self, angles):
-        drive = tabulated(angles, interpolate="monotone")
-        for knot in KNOTS[1:-1]:
-            before, after = shape(drive, knot - 1e-10)[1], shape(drive, knot + 1e-10)[1]
-            assert after == pytest.approx(before, rel=1e-6, abs=1e-6)
-
     def test_spline_that_overshoots_a_step_is_warned_of(self, scene, caplog):
         step = {"law": "table", "time": [0.0, 0.5, 0.51, 1.0, 1.01, 5.0], "theta": [0.0, 0.0, 3.0, 3.0, 0.0, 0.0]}
         load({"scene": scene | {"drive": step | {"interpolate": "monotone"}}})

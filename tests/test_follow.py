@@ -157,12 +157,6 @@ class TestTheSameBits:
         for name in NAMES:
             assert np.array_equal(found[name], both[name], equal_nan=True), name
 
-    def test_from_the_configuration_in_the_file(self, both, tmp_path):
-        branches(tmp_path / "a.nc").close()
-        again = ringsweep.run(tmp_path / "a.nc", progress=False, jobs=1)
-        assert again.sizes == both.sizes
-        assert np.array_equal(again.x_end, both.x_end)
-
 
 @pytest.mark.slow
 class TestAFileGoesOn:

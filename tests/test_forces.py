@@ -376,7 +376,3 @@ class TestParts:
     )
     def test_force_that_makes_no_sense_is_refused_by_its_path(self, force, message):
         refused(message, ringsweep.simulate, self.plain(force=force))
-
-    def test_ring_has_no_such_parts(self, scene):
-        for section in ("force", "damper"):
-            refused(f"scene.{section}: unknown key", ringsweep.simulate, scene | {section: {"constant": 1.0}})

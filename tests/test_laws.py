@@ -223,15 +223,6 @@ class TestPublishedFormula:
             assert found.length * slope(found.law, speed) == pytest.approx(exact, rel=1e-12, abs=off), found
 
     @some
-    @given(every, st.floats(0.0, 30.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-    def test_two_surfaces_at_once_have_the_friction_of_each(self, laws, relative, mu_s, share):
-        for found in laws:
-            speed, pair = relative * found.length, (mu_s, share * mu_s)
-            both = friction_at(found.law, speed, (MU_S, MU_K, *pair))
-            one, other = friction_at(found.law, speed, (MU_S, MU_K)), friction_at(found.law, speed, pair)
-            assert both == pytest.approx((one[0], other[0], one[1], other[1]), rel=1e-14)
-
-    @some
     @given(every, st.floats(0.0, 3.0), st.lists(st.floats(-1.0, 1.0), min_size=8, max_size=8))
     def test_series_of_friction_is_friction_at_the_moved_speed(self, laws, relative, coefficients):
         for found in laws:

@@ -140,15 +140,6 @@ class TestReuse:
             assert "full.nc: holds another sweep: sweep.refine.axes was absent" in capsys.readouterr().err
             assert target.read_bytes() == full.read_bytes()
 
-    @pytest.mark.slow
-    def test_finer_refined_sweep_takes_computed_cells_of_a_coarser_one(self, scene, refined, ds, tmp_path, stored):
-        finer = AXES | {"drive.amplitude": np.geomspace(0.5, 8.0, 81)}
-        alone = ringsweep.sweep(scene, finer, refine=REFINE, progress=False)
-        found = ringsweep.sweep(scene, finer, tmp_path / "new.nc", refine=REFINE, reuse=refined, progress=False)
-        xr.testing.assert_equal(found.load().drop_vars("drive_amplitude"), alone.drop_vars("drive_amplitude"))
-        found.close()
-        assert len(stored) == alone.attrs["cells_computed"]
-
     @pytest.mark.parametrize("source", ["refined", "full"])
     def test_full_and_refined_sweeps_take_cells_of_each_other(
         self, scene, source, refined, full, tmp_path, caplog, request

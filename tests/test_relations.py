@@ -295,21 +295,3 @@ class TestSweeps:
             found.append(ringsweep.run({"scene": scene, "sweep": {"sample": sample}}, jobs=1, progress=False))
         np.testing.assert_array_equal(found[0].probability, found[1].probability)
         assert ((found[0].probability > 0.0) & (found[0].probability < 1.0)).any()
-
-
-class TestShiftOfTime:
-    def test_forced_belt_launched_again_after_whole_periods_goes_on_alike(self):
-        kind = replace(KINDS["belt"], fixed={"force.frequency": 0.5})
-        run = relations.random_scenes(kind, 200, np.random.default_rng(6))
-
-        def outcomes(**changed):
-            return relations.Run(kind, run.numbers | changed, run.scene).outcomes()
-
-        whole, before = outcomes(**{"time.span": np.full(200, 11.0)}), outcomes(**{"time.span": np.full(200, 6.0)})
-        state = {"initial.x": before.x_end.values, "initial.velocity": before.velocity_end.values}
-        after = outcomes(**state, **{"time.span": np.full(200, 5.0)})
-        assert (whole.certified & before.certified & after.certified).all()
-        for name in ("x_end", "velocity_end"):
-            # What is left of the error at the launch has no bound of its own.
-            bound = whole[f"{name}_error"] + after[f"{name}_error"] + 30.0 * before[f"{name}_error"]
-            assert float((abs(whole[name] - after[name]) / bound).quantile(0.99)) < 1.0

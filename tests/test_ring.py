@@ -87,6 +87,7 @@ class TestDeclaredBalances:
             (("mass/radius = N1", "mass*radius*phi_dd = K1*N1"), "only sums, .* such as a quotient"),
             (("mass*gravity - N1", "mass*radius*phi_dd = K1*N1"), "an equation, with one `=`"),
             (("mass*radius*phi_dd = K1*N1", "mass*gravity = N1"), "has no phi_dd: the last balance"),
+            ("N1 = mass*gravity", "balances is one text"),
             (("mass*gravity = N1",), "1 in number: give two .* is a comma missing"),
         ],
     )

@@ -144,17 +144,12 @@ def test_exponents_are_those_of_two_neighbouring_runs(law):
         sweep = {"points": {path: np.asarray(column).tolist() for path, column in points.items()}}
         return run(scene, record, sweep=sweep, solver={"method": "auto", "certify": False})
 
-    def ends(state):
-        both = {path: np.tile(column, 2) for path, column in points.items()} | {"time.span": np.tile(1 / frequency, 2)}
-        both["initial.phi"], both["initial.omega"] = state
-        last = outcomes(both, {})
-        return np.array([last.phi_end.values, last.omega_end.values])
-
     found = outcomes(points | {"time.span": periods / frequency}, section(1))
-    state = np.array([points["initial.phi"], points["initial.omega"]])
+    one_period = points | {"time.span": 1.0 / frequency}
     weight = np.maximum(2.0 * np.pi * frequency, np.sqrt(GRAVITY / 0.043378))
     kept = np.isfinite(found.lyapunov.values)
-    used = growth(ends, state, weight, periods, 1e-7)[periods // 4 :, kept]
+    used = growth(lambda both: outcomes(both, {}), one_period, ("phi", "omega"), weight, periods, 1e-7)
+    used = used[periods // 4 :, kept]
     error = np.hypot(used.std(axis=0) / np.sqrt(len(used)), (found.lyapunov_error.values / frequency)[kept])
     difference = np.abs((found.lyapunov.values / frequency)[kept] - used.mean(axis=0))
     assert (np.abs(used.mean(axis=0)) > 0.1).sum() >= 5

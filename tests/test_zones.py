@@ -51,12 +51,6 @@ class TestMembership:
         last = max((k for k, arc in enumerate(arcs, start=1) if on(arc, angle)), default=0)
         assert found_at(surface_with(arcs), angle) == ((float(last), 0.5 * last, last) if last else (*REST, 0))
 
-    @given(centers, half_angles, angles, st.integers(-10_000, 10_000))
-    def test_coefficients_do_not_depend_on_whole_turns(self, center, half_angle, angle, turns):
-        assume(clear_of_edges([(center, half_angle)], angle))
-        surface = surface_with([(center, half_angle)])
-        assert found_at(surface, angle + 2 * pi * turns) == found_at(surface, angle)
-
     @given(angles)
     def test_ring_without_arcs_is_uniform(self, angle):
         surface = surface_of([], *REST)
