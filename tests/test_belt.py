@@ -209,8 +209,8 @@ def test_law_tends_to_its_limit_with_the_power_of_theory(law, of, values, limit,
     np.testing.assert_allclose(np.diff(np.log(errors)) / np.diff(np.log(values)), power, atol=within)
 
 
-class TestTwoMethods:
-    """Methods agree where a constant step resolves the law; events set the order of its error."""
+class TestMethods:
+    """What each method can resolve."""
 
     def test_error_of_lugre_falls_with_the_tolerance(self):
         """This holds also where the body begins to stick, and the Stribeck curve rises within 1/1000 of a step."""

@@ -1,4 +1,4 @@
-"""The belt whose normal load grows with the displacement, N = m g + k_n x, against closed forms and SciPy."""
+"""The belt whose normal load grows with the displacement, N = m g + k_n x, against closed forms."""
 
 from math import acos, atan2, pi, sqrt
 

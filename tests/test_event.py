@@ -25,7 +25,7 @@ def stiction(cells):
 
 
 class TestFigures:
-    """Figures of the paper in the limit of a vanishing stiction band, with and without the tail."""
+    """Figure 30 of the paper in the limit of a vanishing stiction band."""
 
     def test_error_of_event_falls_with_the_tolerance(self, setting):
         batch = setting(30, "tustin")

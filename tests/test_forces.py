@@ -238,7 +238,7 @@ def everything(rng, law="stiction", *, table=False):
 
 
 class TestMethods:
-    """All parts together, by all methods and by SciPy."""
+    """All parts together, by SciPy."""
 
     @pytest.mark.parametrize("table", mostly_slow([False, True], [False]), ids=["harmonic", "table"])
     def test_event_agrees_with_an_independent_integration(self, table):
