@@ -154,6 +154,7 @@ class TestAHistoryAtOtherTimes:
     @pytest.mark.parametrize(("times", "problem"), [("soon", "numbers"), ([[1.0]], "one dimension")])
     def test_wrong_times_are_refused(self, run, times, problem):
         refused(problem, run.ringsweep.at, times)
+        refused("no time history", xr.Dataset().ringsweep.at, times)
 
 
 def test_dataset_in_place_of_a_scene_is_refused_with_what_to_call(ds):

@@ -123,6 +123,13 @@ class TestBoundary:
         assert problem in capsys.readouterr().err
         assert [path.name for path in tmp_path.iterdir()] == ["my.nc"]
 
+    def test_boundary_does_not_replace_a_sweep(self, ds, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        for name in ("my.nc", "my-separating.nc"):
+            netcdf.save(ds, name)
+        assert cli.main(["map", "my.nc", "--boundaries", "separating"]) == 2
+        assert "my-separating.nc: holds a result of another kind" in capsys.readouterr().err
+
     @pytest.mark.parametrize(
         ("regime", "tolerance", "problem"),
         [

@@ -197,6 +197,7 @@ BAD_LINES = {
     "negative mass": ("0.076 kg", "-76 g", "scene.body.mass", 3, "must be greater than 0 kg"),
     "kinetic beyond static": ("mu_k: 0.1", "mu_k: 0.4", "scene.friction.rest.mu_k", 8, "0.4 exceeds mu_s"),
     "ring too small": ("43.378 mm", "35 mm", "scene.ring.radius", 4, "too small"),
+    "a section that is none": ("{span: 10}", "10", "scene.time", 16, "a section is expected"),
     "given twice": ("    alpha: 1.0e5", "    v0: 1.0e5", "scene.friction.v0", 10, "given twice"),
     "a tag": ("0.076 kg", "!!python/object:os.system x", "scene.body.mass", 3, "tag"),
     "axis of nothing": ("amplitude: {", "amplitud: {", "sweep.grid.drive.amplitud", 20, "`drive.amplitude`"),

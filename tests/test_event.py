@@ -8,7 +8,7 @@ from solutions import Fall, motion, solve, trail
 from tiers import mostly_slow
 
 from ringsweep.compile import take
-from ringsweep.quantities.flags import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import JAMMED, OSCILLATORY, RESTING, REVOLVING
 from ringsweep.solvers.event import Event
 
 EXACT = Event(rtol=1e-14, certify=False)
@@ -128,13 +128,3 @@ class TestEnds:
         assert found.regime == JAMMED
         assert found.motion == RESTING
         assert found.phi_end == pytest.approx(1.5 - np.radians(15.0) - take(batch.body, 0).beta, abs=1e-13)
-
-    def test_separation_is_located_where_the_reaction_vanishes(self, stiction):
-        batch = stiction({"initial.omega": np.linspace(30, 60, 20), "zone.half_angle": 0.0})
-        found = solve(Event(), batch)
-        assert (found.regime == SEPARATING).all()
-        for phi, omega, contact in zip(found.phi_end, found.omega_end, found.separating_contact, strict=True):
-            reactions = motion(take(batch.body, 0), -0.1, -0.1)[1:] @ (omega**2, cos(phi), sin(phi))
-            assert reactions[int(contact) - 1] == pytest.approx(0.0, abs=1e-9)
-            assert reactions[2 - int(contact)] > 0
-        np.testing.assert_allclose(np.minimum(found.normal_min_1, found.normal_min_2), 0.0, atol=1e-9)

@@ -13,6 +13,8 @@ from tiers import mostly_slow
 
 import ringsweep
 from ringsweep.physics.impact import Balls, Contact, Motion, contact_of, impulses
+from ringsweep.quantities.flags import AFTERMATHS
+from ringsweep.quantities.variables import INFERRED
 
 G, RADIUS = 9.81, 0.2
 
@@ -562,3 +564,12 @@ class TestRefused:
     )  # fmt: skip
     def test_what_has_no_impact_is_refused_with_its_place(self, change, solver, problem):
         refused(problem, ringsweep.sweep, BODY | change, {"drive.amplitude": [1.0]}, solver=solver, progress=False)
+
+
+@pytest.mark.slow
+def test_refined_map_follows_the_words_of_aftermath_within_one_regime():
+    axes = {"drive.amplitude": np.geomspace(2.0, 8.0, 33), "time.span": np.linspace(0.3, 3.0, 33)}
+    full, ds = (ringsweep.sweep(BODY, axes, refine=refine, progress=False) for refine in (None, {"stride": 8}))
+    assert set(np.unique(full.aftermath)) == set(range(len(AFTERMATHS)))
+    assert 0.2 < (ds.origin == INFERRED).mean() < 0.8
+    assert (ds.aftermath != full.aftermath).mean() < 0.01

@@ -1,5 +1,6 @@
 """Order of the cells of a sweep, and division into tasks."""
 
+import math
 from threading import Event
 
 import numpy as np
@@ -7,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsweep.runs.task_sizes import TaskSizes, divide_into_tasks
-from ringsweep.storage.chunks import Layout
+from ringsweep.storage.chunks import CHUNK, Layout
 
 
 class FinishedTask:
@@ -39,6 +40,15 @@ def test_every_cell_has_one_position_and_lies_in_its_chunk(sizes, data):
         assert end - begin == here.sum()
     assert after == layout.total
     assert (seen == 1).all()
+
+
+@given(sizes=st.lists(st.integers(1, 300), min_size=1, max_size=5))
+def test_chunk_is_not_larger_than_allowed_and_not_needlessly_small(sizes):
+    chunk = Layout(sizes).chunk
+    assert math.prod(chunk) <= CHUNK
+    assert all(1 <= edge <= size for edge, size in zip(chunk, sizes, strict=True))
+    if math.prod(sizes) > CHUNK:
+        assert math.prod(chunk) > CHUNK / 4
 
 
 class TestTaskSizes:

@@ -5,20 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.peers import in_c, with_scipy
+from benchmarks.peers import in_c
 from benchmarks.work_precision import RESTITUTION, SCENES, own
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["smooth", "limit"])
-def test_scipy_with_events_and_restarts_agrees_with_the_package(name):
-    scene = SCENES[name]
-    cells = scene.cells(6)
-    ours = own(scene, scene.method, cells, rtol=1e-11)()
-    theirs = with_scipy.ring(scene.law, cells, "LSODA", 1e-9)()
-    assert 0 < np.isfinite(ours.separation).sum() < 6
-    np.testing.assert_allclose(theirs.end, ours.end, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(theirs.separation, ours.separation, rtol=0, atol=1e-6)
 
 
 @pytest.mark.slow
