@@ -61,6 +61,17 @@ def test_friction_over_patches_takes_the_energy_of_the_launch(frame, period):
 LAWS = ("stiction", "dahl", "lugre", "elasto-plastic", "reset-integrator", "bristle")
 
 
+@pytest.mark.parametrize("law", mostly_slow(["stiction", "dahl", "reset-integrator"], ["stiction"]))
+def test_patches_move_with_their_belt(law):
+    """Seen from the belt a body slides as on one at rest; under stiff bristles nearly as far as under Coulomb's law."""
+    rest = {"velocity": 0.4, "stiffness": 0.0, "force": (0.0, 0.5), "start": (0.0, 2.4), "span": 4.0}
+    patch = [(0.3, 0.1, 0.4, 0.4)], (0.1, 0.1)
+    scene = with_zones(*patch, **rest) if law == "stiction" else on_bristles(law, "belt", *patch, **rest)
+    scene["friction"] |= {} if law == "stiction" else {"sigma0": 1e6}
+    stop = where_it_stops(2.0 / G, 0.2, 0.4, 1.0, 0.4, 0.1)
+    assert outcome(scene).x_end.item() - 0.4 * 4.0 == pytest.approx(stop, rel=1e-12 if law == "stiction" else 1e-4)
+
+
 @pytest.mark.parametrize("law", mostly_slow(LAWS, ["stiction"]))
 def test_a_patch_of_the_whole_period_is_no_patch(law):
     axes = {"belt.velocity": np.linspace(0.05, 0.6, 6)}
@@ -208,13 +219,3 @@ def test_a_rocking_belt_with_zones_shares_its_period_with_force_and_load(load):
     scene["drive"] = {"law": "sinusoidal", "amplitude": 0.1, "frequency": 1.5}
     scene["body"] |= {"load": load} if load else {}
     assert cells_of(scene).forcing_period == pytest.approx(2.0)
-
-
-def test_length_and_period_are_axes_of_points():
-    scene = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1), start=(0.0, 2.0))
-    axes = {"zones.0.half_length": [0.05, 0.1], "belt.period": xr.DataArray([0.7, 0.9], dims="cell")}
-    run = ringsweep.sweep(scene, axes, progress=False).transpose("zones_0_half_length", "cell")
-    for i, half in enumerate((0.05, 0.1)):
-        for j, period in enumerate((0.7, 0.9)):
-            stop = where_it_stops(2.0 / G, 0.3 - half, 0.3 + half, period, 0.4, 0.1)
-            assert run.x_end.values[i, j] == pytest.approx(stop, rel=1e-12)
