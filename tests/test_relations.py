@@ -54,6 +54,7 @@ KINDS = {
     "ring-lugre": Kind("ring", "lugre", "sinusoidal", arcs=2),
     "belt-karnopp": Kind("belt", "karnopp", force="harmonic", parts=LOADS[:1], span=(2, 20)),
     "belt-tables": Kind("belt", "coulomb", "table", force="table", span=(2, 20)),
+    "belt-tables-smooth": Kind("belt", "bengisu-akay", "table", force="table", span=(2, 20)),
     "belt-out-of-step": Kind("belt", "stiction", "sinusoidal", force="harmonic", span=(2, 20)),
     "belt-two-tones": Kind("belt", "hyperbolic", "clocked", force="two-tones", span=(2, 20)),
     "belt-power": Kind("belt", "stiction", "power", force="constant", span=(2, 20)),
@@ -233,7 +234,7 @@ class TestLaunch:
 #: Kinds under laws that a constant step resolves in most cells.
 RESOLVED = (
     *("belt-smooth", "belt-lugre", "belt-zones-smooth", "belt-zones-bristles", "belt-two-way-smooth"),
-    *("belt-jumps-smooth", "belt-dahl", "ring-smooth", "ring-dahl"),
+    *("belt-jumps-smooth", "belt-tables-smooth", "belt-dahl", "ring-smooth", "ring-dahl"),
 )
 
 #: Numbers of a run that hang on no instant of its steps.
