@@ -155,16 +155,6 @@ class TestBody:
 
 
 class TestTime:
-    @pytest.mark.slow
-    @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
-    def test_resting_body_without_gravity_loses_both_contacts_at_launch(self, cells, law):
-        """The ring moves under the body: the sum of sliding velocity and speed of the ring is zero but for rounding."""
-        scene = {"gravity": 0.0, "initial.omega": 0.0, "drive.frequency": 1.3, "time.span": 1.0}
-        scene["drive.amplitude"] = np.linspace(-3.0, 3.1, 40)
-        found = solve(Auto(), cells(scene, law=law, drive="sinusoidal"))
-        np.testing.assert_array_equal(found.regime, SEPARATING)
-        np.testing.assert_array_equal(found.t_end, 0.0)
-
     def test_run_that_would_not_end_within_its_steps_is_given_up_early(self, cells):
         found = solve(Auto(), cells({"drive.amplitude": 0.7, "time.span": 1e8}, drive="arctan"))
         assert (found.regime, found.certified) == (FAILED, 0)

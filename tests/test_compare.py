@@ -103,9 +103,6 @@ class TestConfiguration:
         # The schema does not know the names that a scene or a session gives to laws of its own.
         assert Draft202012Validator(schema()).is_valid(grid(friction__law=laws)) == ("did you mean" in problem)
 
-    def test_misspelt_law_of_the_scene_is_refused_even_if_laws_are_swept(self):
-        assert refusal(load, changed(scene__friction__law="colomb")).path == "scene.friction.law"
-
     def test_parameter_that_one_law_needs_must_be_given_or_swept(self):
         missing = changed(scene__friction__alpha=None)
         assert refusal(load, missing).path == "scene.friction.alpha"
@@ -137,12 +134,6 @@ class TestConfiguration:
         wrong["scene"]["belt"].clear()
         assert refusal(load, wrong).problem.endswith("static friction")
         assert refusal(load, grid(friction__law=LAWS, friction__mu_s=[0.05, 0.2])).problem.endswith("of the sweep)")
-
-    def test_schema_accepts_laws_as_an_axis(self):
-        Draft202012Validator(schema()).validate(CONFIG)
-        points = {"points": {"friction.law": ["coulomb", "coulomb"], "belt.velocity": [0.1, 0.2]}}
-        Draft202012Validator(schema()).validate(changed(sweep=points))
-        assert load(changed(sweep=points)).axes.sizes == {"point": 2}
 
 
 class TestRuns:

@@ -67,15 +67,6 @@ class TestAxes:
         again = ringsweep.run(json.loads(points.attrs["configuration"]), progress=False)
         np.testing.assert_array_equal(again.t_end, points.t_end)
 
-    def test_points_combine_with_a_grid(self, scene, grid):
-        config = {
-            "scene": scene,
-            "sweep": {"points": {"drive.amplitude": AMPLITUDES}, "grid": {"zone.half_angle": WIDTHS}},
-        }
-        found = ringsweep.run(config, progress=False)
-        assert dict(found.sizes) == {"point": 3, "zone_half_angle": 3}
-        np.testing.assert_array_equal(found.t_end, grid.t_end)
-
 
 class TestSingleRun:
     def test_history_and_outcome_of_a_run_agree(self, scene):

@@ -61,13 +61,3 @@ class TestEvents:
             at = np.flatnonzero(np.diff(zone.values))
             held = (gap.values[at] == 0.0) & (gap.values[at + 1] == 0.0)
             assert np.isin(run.time.values[at][held], edges).all()
-
-    @pytest.mark.slow
-    def test_runs_under_several_laws_have_tables_side_by_side(self, capsys):
-        runs = ringsweep.simulate({"scene": BELT, "sweep": {"grid": {"friction.law": ["coulomb", "stiction"]}}})
-        alone = ringsweep.simulate(BELT)
-        both = runs.sel(friction_law="stiction")
-        np.testing.assert_array_equal(told(both, "breakaway"), told(alone, "breakaway"))
-        assert runs.event_kind.dtype == alone.event_kind.dtype
-        print(events_in_words(runs))
-        assert "stiction: events: breakaway 2, stop 2\n  7.3575 s breakaway\n" in capsys.readouterr().out

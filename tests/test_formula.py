@@ -522,19 +522,6 @@ class TestNarrowFeatures:
 
 @pytest.mark.slow
 class TestMotion:
-    @pytest.mark.parametrize(
-        ("law", "method", "build"), [("tustin", "event", "belt"), ("bengisu-akay", "implicit", "ring")]
-    )
-    def test_formula_moves_a_body_as_the_law_of_the_package_does(self, law, method, build):
-        mu, at_rest, parameters = TWINS[law]
-        definition = {"law": "formula", "mu": mu} | ({"at_rest": at_rest} if at_rest else {})
-        make, names = (belt, ("x_end", "x_max")) if build == "belt" else (on_ring, ("phi_end", "phi_max"))
-        pair = {"mu_s": 0.4, "mu_k": 0.25} if build == "belt" else {}
-        twin = outcome(make(definition | parameters | pair), method)
-        known = outcome(make({"law": law} | parameters | pair), method)
-        assert twin["regime"] == known["regime"]
-        assert distance(twin, known, names) < 1e-9
-
     @pytest.mark.parametrize("method", ["event", {"method": "rk4", "steps": 2000}])
     def test_run_fails_if_and_only_if_it_meets_a_speed_without_friction(self, method):
         """The body at rest on a belt at 0.01 m/s breaks loose and slips faster than the first formula allows."""

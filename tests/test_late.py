@@ -61,16 +61,6 @@ class TestForcedBelts:
         np.testing.assert_allclose(found.x_end[1:], found.x_end[0], rtol=1e-13)
 
     @pytest.mark.slow
-    def test_two_tolerances_do_not_exclude_each_other_late(self):
-        """After some 50 000 periods the rounding of a time would be more than the errors of the runs."""
-        frequency, span = np.array([11.0, 13.0]) / 64.0, np.full(2, 240000.0)
-        axes = {"force.frequency": frequency, "time.span": span}
-        rough, fine = (runs(forced(LAWS[0], frequency=1.0), axes, method="event", rtol=rtol) for rtol in (1e-10, 1e-13))
-        assert (rough.certified == 1).all()
-        assert (fine.certified == 1).all()
-        assert (abs(rough.x_end - fine.x_end) <= rough.x_end_error + fine.x_end_error).all()
-
-    @pytest.mark.slow
     def test_narrow_pulse_after_a_long_rest_breaks_the_body_loose(self):
         """The pulse is up to 1e12 of its widths away; its time is known to the rounding of its largest term."""
         width, mu_s = 1e-3, 0.2
