@@ -158,6 +158,15 @@ class TestRandomScenes:
         assert 10 < zero.sum() < 100
         assert not (found.lyapunov_error.values[zero] == 0.0).any()
 
+    @pytest.mark.slow
+    def test_exponent_on_bristles_is_known_to_its_bound(self):
+        """The scatter of its growth does not show the errors of implicit steps."""
+        kind = replace(KINDS["belt-lugre"], parts=(), record={"exponent": True}, span=(2, 8), load=True)
+        run = relations.random_scenes(kind, 100, np.random.default_rng(48))
+        first, second = run.outcomes(), run.outcomes(solver={"method": "implicit", "rtol": 1e-10})
+        bound = first.lyapunov_error + second.lyapunov_error
+        assert (abs(first.lyapunov - second.lyapunov) <= bound).values[relations.sure(first, second)].mean() > 0.98
+
     @pytest.mark.parametrize("scales", [{"mass": 2.0**50}, {"length": 2.0**-20}, {"time": 2.0**-15}])
     def test_units_that_are_powers_of_two_change_no_bit(self, drawn, scales):
         run, first = drawn

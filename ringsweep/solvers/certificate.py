@@ -133,7 +133,7 @@ def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes:
 def judged(
     runs: TwoRuns, fall_rates: Any, diverge: NDArray[np.bool_], doubt: tuple[NDArray[np.bool_], int], **bounds: Any
 ) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
-    """What speaks against the certificate of each cell, and bounds on its errors.
+    """What speaks against the certificate of each cell, and bounds on its errors; widens that of an exponent.
 
     Parameters
     ----------
@@ -167,6 +167,12 @@ def judged(
     because = np.select([holds for _, holds in cases], [reason for reason, _ in cases], CERTIFIED).astype(np.int8)
     found = errors(runs, **bounds)
     found[diverge] = np.nan
+    if "lyapunov" in outcomes:
+        # What a run tells of the error of its exponent is the scatter of the growth, without the errors of its steps.
+        column = outcomes.index("lyapunov_error")
+        with np.errstate(invalid="ignore"):
+            of_steps = np.where(diverge, 0.0, bounds["safety"] * abs(one.lyapunov - other.lyapunov))
+        rows[:, column] += np.nan_to_num(of_steps, posinf=0.0)
     return because, found
 
 
