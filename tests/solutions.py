@@ -126,7 +126,7 @@ HISTORY = ("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zon
 def trail(method, batch, spacing):
     """History of the first cell: the end of every step, and instants `spacing` apart, s."""
     history = History(spacing, np.empty(2_000_000), np.empty((2_000_000, len(HISTORY))))
-    no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 6)))
+    no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 7)))
     count = integrate(take(batch, [0]), method.tolerances(), method.max_steps, no_results, history)
     return SimpleNamespace(t=history.times[:count], **dict(zip(HISTORY, history.table[:count].T, strict=True)))
 

@@ -316,6 +316,54 @@ class TestErrors:
         assert abs(found.x_end - exact.x_end) <= found.x_end_error <= 1e-6
         assert abs(found.velocity_end - exact.velocity_end) <= found.velocity_end_error <= 1e-5
 
+    def test_bound_covers_the_instant_at_which_a_reaction_vanishes(self, cells):
+        """A contact opens within the first step, which both runs share; their difference tells nothing of its end."""
+        values = dict(zip(COEFFICIENTS, (0.15533, 0.11516, 0.17015, 0.020433), strict=True)) | {
+            "body.mass": 0.038098,
+            "body.inertia": 5.1972e-7,
+            "body.half_distance": 0.0076675,
+            "body.ball_radius": 0.0125275,
+            "body.center_offset": -0.0010786,
+            "ring.radius": 0.0352157,
+            "friction.alpha": 1.814,
+            "friction.v0": 0.034008,
+            "zone.center": -0.06667,
+            "zone.half_angle": 0.11942,
+            "drive.amplitude": -7.43758,
+            "initial.phi": 1.45488,
+            "time.span": 1.3927,
+        }
+        self.covers(cells(values), "omega_min", "omega_end", "phi_end", "t_separation", share=1.0)
+
+    @pytest.mark.slow
+    def test_bound_covers_a_creep_that_errs_more_in_its_place_than_in_its_velocity(self, cells):
+        """Both runs share the first steps, whose error is that of the place."""
+        values = dict(zip(COEFFICIENTS, (0.03996, 0.03996, 0.496677, 0.496677), strict=True)) | {
+            "body.mass": 0.146493,
+            "body.inertia": 0.000155509,
+            "body.half_distance": 0.033916,
+            "body.ball_radius": 0.01351928,
+            "ring.radius": 0.0513876,
+            "friction.v_s": 0.0449044,
+            "friction.k_t": 136.7757,
+            "zone.center": -0.69954,
+            "zone.half_angle": 0.0621312,
+            "drive.amplitude": -0.302782,
+            "initial.phi": 0.1524183,
+            "initial.omega": -0.1484818,
+            "time.span": 2.819076,
+        }
+        self.covers(cells(values, law="andersson", drive="constant"), "phi_end", "phi_min", share=3.0)
+
+    @staticmethod
+    def covers(batch, *outcomes, share):
+        """Check that no error of these outcomes exceeds its bound by more than this factor."""
+        found, exact = Auto().run(batch, NAMES), solve(Implicit(rtol=1e-12), batch)
+        assert found.certified.all()
+        for name in outcomes:
+            error = abs(found.rows[0, NAMES.index(name)] - getattr(exact, name))
+            assert error <= share * found.errors[0, with_errors(NAMES).index(name)]
+
     def test_error_bounds_link_to_variables_and_are_absent_if_uncertified(self, scene):
         axes = {"drive.amplitude": [0.1, 2.0]}
         found = ringsweep.sweep(scene, axes)

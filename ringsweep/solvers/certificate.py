@@ -247,6 +247,7 @@ def errors(
     rate_floor: Any = 0.0,
     force_floor: Any = 0.0,
     friction_floor: Any = 0.0,
+    instant_floor: Any = 0.0,
 ) -> NDArray[np.float64]:
     """Bounds on the errors of runs, from second runs at another resolution.
 
@@ -269,6 +270,8 @@ def errors(
         velocities have in addition.
     force_floor, friction_floor : float or ndarray of shape ``(cells,)``
         Relative errors that forces and jumps, and that friction itself, have in addition.
+    instant_floor : float or ndarray of shape ``(cells,)``
+        Error of the instant at which a reaction vanishes, in units of the scale of forces, s/N.
 
     Returns
     -------
@@ -296,14 +299,24 @@ def errors(
     one, _ = runs.named
     end, jumps = names.index("t_end"), _columns_of(runs, "jump_max")
     bound[(one.regime == one.motion) & (difference[:, end] == 0.0), end] = 0.0
+    late = np.where(one.t_end < runs.batch.span, instant_floor * scale[:, units.index("N")], 0.0)
+    for k in (k for k, name in enumerate(names) if name in ("t_end", "t_separation")):
+        bound[:, k] += late
     # If two runs end at nearly the same event by chance, their last velocities are close by the same chance.
-    lasts = ["omega_end"] if "omega_end" in names else _columns_of(runs, "velocity_end")
-    for jump_max, velocity_end in zip(jumps, lasts, strict=True):
-        jump, last = names.index(jump_max), names.index(velocity_end)
+    at_end = ("phi_end", "omega_end") if "omega_end" in names else ("x_end", "velocity_end")
+    for jump_max, *ends in zip(jumps, *(_columns_of(runs, name) for name in at_end), strict=True):
+        jump, last = names.index(jump_max), names.index(ends[1])
         bound[(vars(one)[jump_max] == 0.0) & (difference[:, jump] == 0.0), jump] = 0.0
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             acceleration = np.minimum(difference[:, last] / difference[:, end], scale[:, jump])
-            bound[:, last] = np.fmax(bound[:, last], bound[:, end] * acceleration)
+            of_velocity = np.fmax(bound[:, end] * acceleration, late * scale[:, jump])
+            of_place = late * np.abs(vars(one)[ends[1]])
+            for k, name in enumerate(names):
+                for value, by in zip(ends, (of_place, of_velocity), strict=True):
+                    # An extreme may be the value at the end.
+                    if units[k] == OUTCOMES[value].units:
+                        is_last = np.abs(vars(one)[name] - vars(one)[value]) <= by
+                        bound[:, k] = np.where(is_last, np.fmax(bound[:, k], by), bound[:, k])
     bound[~agree(runs.rows, runs.second_rows, runs.outcomes)] = np.nan
     return bound
 

@@ -35,18 +35,16 @@ _MOST_STEPS = 100_000_000
 _MOST_RETRIES = 3
 
 # Errors of a run that the difference from the second run does not show, found by experiment, see docs/accuracy.md. In
-# units of the remainder of a series: once in a run, and for each shared step; of forces, in units of the remainder that
-# their tolerance allows, since within a step they come from the series: once, and under friction that varies for the
-# shared steps. In units of the tolerance of an implicit step: once in a run with bristles; and for each shared step, a
-# share of its estimate, under smooth laws and with bristles: their law may bend within the step, which deceives the
-# estimate, and all runs damp their vibrations.
-_ONCE, _SHARED, _SHARE_OF_REACTIONS, _SHARED_REACTIONS = 0.2, 3.0, 0.05, 0.3
-_ONCE_IMPLICIT, _SHARED_IMPLICIT, _SHARED_BRISTLES = 0.05, 0.05, 1.0
+# units of the remainder of a series, for each shared step; of forces, in units of the remainder that their tolerance
+# allows, since within a step they come from the series: once in a run, and under friction that varies for the shared
+# steps. In units of the tolerance of an implicit step: once in a run with bristles, as all runs damp their vibrations.
+_SHARED, _SHARE_OF_REACTIONS, _SHARED_REACTIONS, _ONCE_IMPLICIT = 3.0, 0.05, 0.35, 0.05
 
-# Largest error of a run, in units of its difference from the run at the looser tolerance; and shares of the largest
-# relative difference that count in every number, and in forces. Where friction varies with the speed, the errors of
-# both runs are as good as independent: the ends of steps decide their signs and sizes. Forces magnify them.
-_CONSTANT, _VARYING, _BRISTLES = (0.8, 0.04, 0.04), (2.0, 0.05, 0.2), (2.0, 0.2, 1.0)
+# Largest error of a run, in units of its difference from the run at the looser tolerance; shares of the largest
+# relative difference that count in every number, and in forces; and what a run errs by in any case, in units of the
+# remainder. Where friction varies with the speed, the errors of both runs are as good as independent: the ends of steps
+# decide their signs and sizes. Forces magnify them.
+_CONSTANT, _VARYING, _BRISTLES = (0.8, 0.04, 0.04, 0.2), (1.9, 0.09, 0.2, 0.4), (2.0, 0.2, 1.0, 0.2)
 
 # Impacts magnify the errors before them: a small difference of two runs is then less certain by this factor.
 _MAGNIFIED = 3.0
@@ -178,16 +176,18 @@ class _Piecewise(Method):
         # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
         ratio = tolerance ** (1.0 / ORDER)
         remainder = tolerance * ratio / (1.0 - ratio)
-        once, shared = (_ONCE_IMPLICIT, _SHARED_BRISTLES) if of_bristles else (0.0, _SHARED_IMPLICIT)
-        floor = remainder * (_ONCE + _SHARED * local.series) + implicit_tolerance * (once + shared * local.implicit)
         # In the stiction band the error of the velocity, a share of the band, is that of friction, a share of it.
         friction_floor = np.where(local.implicit > 0.0, implicit_tolerance, 0.0)
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         _, magnified, left_out = audit.of_events(batch, runs.named[0])
         is_constant = family_of(type(batch.law)) is SetValued and not varies(take(batch, 0).law, 0)
-        # The largest reaction is that of one step.
-        of_forces = _SHARE_OF_REACTIONS + (0.0 if is_constant else _SHARED_REACTIONS) * np.minimum(local.series, 1.0)
-        safety, share, force_share = _CONSTANT if is_constant else _BRISTLES if of_bristles else _VARYING
+        safety, share, force_share, once = _CONSTANT if is_constant else _BRISTLES if of_bristles else _VARYING
+        floor = remainder * (once + _SHARED * local.series)
+        floor += implicit_tolerance * (local.implicit + (_ONCE_IMPLICIT if of_bristles else 0.0))
+        # The largest reaction is that of one step, and a reaction that vanishes is that of the last.
+        shared, last = (0.0, 0.0) if is_constant else (_SHARED_REACTIONS * np.minimum(local.series, 1.0), local.last)
+        with np.errstate(divide="ignore"):
+            per_fall = np.where(audits[:, 2] > 0.0, 1.0 / audits[:, 2], 0.0)
         because, bounds = judged(
             runs,
             audits[:, 2],
@@ -199,8 +199,9 @@ class _Piecewise(Method):
             steps=steps,
             floor=floor + left_out,
             rate_floor=self.tolerances()[of_bristles] * local.rate,
-            force_floor=REACTION_TOLERANCE * remainder * of_forces,
+            force_floor=REACTION_TOLERANCE * remainder * (_SHARE_OF_REACTIONS + shared),
             friction_floor=friction_floor,
+            instant_floor=REACTION_TOLERANCE * remainder * last * per_fall,
         )
         may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])
         return because, bounds, np.where(diverge, distance, np.inf), may_converge
@@ -231,7 +232,7 @@ class _Piecewise(Method):
         Results
         """
         cells = len(batch.span)
-        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, 6)))
+        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, 7)))
         no_history = History(np.inf, np.empty(0), np.empty((0, 0)))
         integrate(batch, tolerances or self.tolerances(), self.max_steps, results, no_history)
         return results
@@ -242,7 +243,7 @@ class _Piecewise(Method):
         size = 4 * samples
         while True:
             history = History(spacing, np.empty(size), np.empty((size, width)))
-            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 6)))
+            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 7)))
             count = integrate(batch, self.tolerances(), self.max_steps, no_results, history)
             if count < size or size >= self.max_steps:
                 return history.times[:count], history.table[:count]
