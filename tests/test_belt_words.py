@@ -157,6 +157,21 @@ class TestPeriod:
 
 
 @pytest.mark.slow
+def test_a_body_that_a_force_takes_through_the_stiction_band_has_not_stopped():
+    """Under any method; one that the force does not take loose at once has."""
+    of = with_all_parts(scene("bengisu-akay", k=1.0, mu_s=0.2, mu_k=0.1, alpha=10.0, v0=0.05, belt=0.5, span=2.0))
+    force = 9.81 * np.concatenate((np.linspace(0.05, 0.19, 10), np.linspace(0.3, 0.6, 10)))
+    axes = {"force.constant": np.concatenate((-force, force))}
+    slips = [
+        ringsweep.sweep(of, axes, solver=method, progress=False).slips
+        for method in ({"method": "auto"}, {"method": "rk4", "steps": 20_000})
+    ]
+    np.testing.assert_array_equal(slips[1], slips[0])
+    assert slips[0].max() == 1
+    assert (slips[0][abs(slips[0].force_constant) > 2.0] == 0).all()
+
+
+@pytest.mark.slow
 class TestBreakingLoose:
     """A body launched at the belt's speed rides until k v t = mu_s F_N, at 0.5 s."""
 

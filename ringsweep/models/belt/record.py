@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, feature, inlined, replacing
 from ringsweep.models import cycles, section, tangent
-from ringsweep.models.belt.force import breakaway_force
+from ringsweep.models.belt.force import at_place, breakaway_force
 from ringsweep.models.belt.stops import no_impact
 from ringsweep.models.cycles import RETURN, Cycles, Mark
 from ringsweep.models.interface import modes, recorder, shock
@@ -211,14 +211,14 @@ def record_at_launch(scene, t, seen, band, play):
     start, end = Mark(t, x, velocity, 0.0, 0.0), cycles.end_of(scene, scene.cycle, 1.0)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
-    way = scene.body.mass * v_rate + force
+    way, here = scene.body.mass * v_rate + force, at_place(scene.surface, scene, x, x - place)
     pull = max(abs(way), abs(scene.body.stiffness * x))
-    passes = band > 0.0 and pull > (1.0 + 1e-9) * breakaway_force(scene, way, x)
+    passes = band > 0.0 and pull > (1.0 + 1e-9) * breakaway_force(here, way, x)
     least = min(_LONGEST_PASSAGE * _pace(scene), _PASSAGE * band * scene.body.mass / pull) if passes else 0.0
     return Record(
         band,
         play,
-        Last(t, x, velocity, place, v, v_rate, scene.body.mass * v_rate + force),
+        Last(t, x, velocity, place, v, _if_known(acceleration, v_rate), way),
         x,
         x,
         velocity,
@@ -231,6 +231,12 @@ def record_at_launch(scene, t, seen, band, play):
         (),
         no_impact(scene.stops),
     )
+
+
+@feature("0.0")
+def _if_known(acceleration, v_rate):
+    """Rate of the sliding velocity that holds until the next observation; methods of constant step tell none."""
+    return v_rate
 
 
 @feature("0.0", absorb=True)
