@@ -157,7 +157,7 @@ class TestPeriod:
 
 
 @pytest.mark.slow
-def test_a_body_that_a_force_takes_through_the_stiction_band_has_not_stopped():
+def test_body_that_a_force_takes_through_the_band_has_not_stopped():
     """Under any method; one that the force does not take loose at once has."""
     of = with_all_parts(scene("bengisu-akay", k=1.0, mu_s=0.2, mu_k=0.1, alpha=10.0, v0=0.05, belt=0.5, span=2.0))
     force = 9.81 * np.concatenate((np.linspace(0.05, 0.19, 10), np.linspace(0.3, 0.6, 10)))

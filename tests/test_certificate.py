@@ -336,7 +336,7 @@ class TestErrors:
         self.covers(cells(values), "omega_min", "omega_end", "phi_end", "t_separation", share=1.0)
 
     @pytest.mark.slow
-    def test_bound_covers_a_creep_that_errs_more_in_its_place_than_in_its_velocity(self, cells):
+    def test_bound_covers_a_creep_that_errs_most_in_its_place(self, cells):
         """Both runs share the first steps, whose error is that of the place."""
         values = dict(zip(COEFFICIENTS, (0.03996, 0.03996, 0.496677, 0.496677), strict=True)) | {
             "body.mass": 0.146493,

@@ -16,7 +16,7 @@ body in the ring's frame; K is friction per unit of a reaction. Functions that r
 
 from __future__ import annotations
 
-from math import cos, inf, isnan, sin
+from math import cos, inf, isfinite, isnan, sin
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, feature, generated, hook, inlined, replacing
@@ -376,6 +376,9 @@ def seen_in_slip_at_once(scene, status, slip, seen):
 @inlined
 def _seen_opened(scene, status, problem, seen):
     """What the recorder is shown of a body that ends at launch; `problem` is the rest of :func:`contact.opened`."""
+    if not isfinite(seen[2] + seen[3]):
+        # The numbers of the launch are too large, or none.
+        return seen
     opens = contact.OPEN_1 if status == SEPARATED_1 else contact.OPEN_2 if status == SEPARATED_2 else contact.OPEN_BOTH
     closed = seen[2], seen[3], seen[4].acceleration
     normal_1, normal_2, epsilon = contact.opened(scene.body, opens, closed, *problem)
