@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from belts import on_belt, outcome
-from relations import Kind, random_scenes
+from relations import Kind, in_order, random_scenes
 from rings import course, shape
 from solutions import solve
 
@@ -296,6 +296,23 @@ class TestErrors:
         ])  # fmt: skip
         assert np.nanmax(ratios) < 3.0
         assert (ratios > 1.0).sum() <= 0.003 * np.isfinite(ratios).sum()
+
+    @pytest.mark.parametrize(
+        ("law", "cell", "rtol"),
+        [
+            ("tustin", 1567, 1e-14),
+            # A creep from rest to rest: by symmetry the error estimate of the step is small.
+            pytest.param("bengisu-akay", 1963, 1e-11, marks=pytest.mark.slow),
+        ],
+    )
+    def test_numbers_that_agree_by_chance_err_by_less_than_three_bounds(self, law, cell, rtol):
+        kind, name = Kind("belt", law, force="harmonic", span=(2.0, 20.0)), law.split("-")[0]
+        run = in_order(random_scenes(kind, 4000, np.random.default_rng([1, *name.encode()])), np.array([cell]))
+        method = "event" if law == "tustin" else "implicit"
+        found, exact = run.outcomes(), run.outcomes(solver={"method": method, "rtol": rtol})
+        for name in ("x_end", "velocity_end", "x_min", "x_max", "force_max"):
+            bound = found[f"{name}_error"] + exact[f"{name}_error"]
+            assert abs(found[name] - exact[name]).item() <= 3.0 * bound.item(), name
 
     @pytest.mark.slow
     def test_difference_that_is_small_by_chance_does_not_make_the_bound_small(self):

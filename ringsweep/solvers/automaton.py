@@ -45,29 +45,36 @@ _with_length, _with_entry_guard = replacing("h"), replacing("entry_guard")
 
 
 class LocalErrors(NamedTuple):
-    """Errors of the steps that a run shares with a run at a looser tolerance.
+    """Errors of the steps of a run, for what the difference from a run at a looser tolerance does not show.
 
-    Something else than the tolerance limits the length of these steps: an event, a knot of the drive, the span, the
-    growth of steps after a start, or the steepness of a friction law. So the difference between the runs does not show
-    their errors.
+    Both runs share a step if something else than the tolerance limits its length: an event, a knot of the drive, the
+    span, the growth of steps after a start, or the steepness of a friction law. And the sums of the errors of all steps
+    may agree by chance.
 
     Attributes
     ----------
     series, last : float
-        Sum over the steps of series, in units of the tolerance, and the last of them; 0 after an implicit step.
+        Sum over the shared steps of series, in units of the tolerance, and the last of them; 0 after an implicit step.
     rate : float
         The same for the rate of the place, rad/s, or on a belt m/s: in stick, where the tolerance applies to the place
         alone and the error is the difference from the velocity of the drive at the end of the step; and on bristles,
         where the tolerance of the velocity is relative to the sliding velocity.
     implicit : float
-        Sum over the implicit steps, in units of the tolerance; without bristles of the error of the place, or of a
-        share of that of the velocity, which friction damps.
+        Sum over the shared implicit steps, in units of the tolerance; without bristles of the error of the place, or of
+        a share of that of the velocity, which friction damps.
+    all_series : float
+        Sum over all steps of series, in units of the tolerance.
+    place : float
+        Sum over all implicit steps under a smooth law, in units of the tolerance: of the distance that the body would
+        go within the step at the difference of its velocity, in the middle of the step, from the rate of its place.
     """
 
     series: float
     last: float
     rate: float
     implicit: float
+    all_series: float
+    place: float
 
 
 class Run(NamedTuple):
@@ -129,7 +136,7 @@ def _step_if_stiff(scene, run, h_max, tolerance, scratch):
     """
     start, control = start_at(scene, scratch.course, run.mode, run.now, run.y), run.control
     if not implicit.is_stiff(scene, run.mode, run.y, start.linear):
-        return False, -1, 0.0, run.y, run.record, control, (0.0, 0.0, 0.0)
+        return False, -1, 0.0, run.y, run.record, control, (0.0, 0.0, 0.0, 0.0)
     if control.last_h == 0.0:
         # The transient into creep decays at this rate.
         control = start_control(min(control.h, -1.0 / start.linear[1][1][1]))
@@ -140,14 +147,15 @@ def _step_if_stiff(scene, run, h_max, tolerance, scratch):
 @_step_of_family.implements(SetValued)
 def _step_by_series(family, scene, run, h_max, tolerances, scratch):
     """Implement :func:`_step_of_family`: by a series in each mode; the implicit control is passed through."""
-    guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch, inf)
+    guard, s, y, record, error, shared = series_step(scene, run, h_max, tolerances[0], scratch, inf)
     rate = 0.0
     if shared > 0.0 and modes.sticks(scene, run.mode):
         # The body moves as the drive does. After an infinite acceleration of the drive steps are so short that a bound
         # that follows from the error of the place, divided by the length of the step, would say nothing.
         velocity = drives.turn(scene.drive, later(run.now, s))[1]
         rate = abs(series.rates_at(scene, scratch.c, s)[0] - velocity) / tolerances[0]
-    local = LocalErrors(run.local.series + shared, shared, run.local.rate + rate, 0.0)
+    before = run.local
+    local = LocalErrors(before.series + shared, shared, before.rate + rate, 0.0, before.all_series + error, 0.0)
     return False, guard, s, y, record, run.control, local
 
 
@@ -160,18 +168,19 @@ def _goes_on(scene, run, guard, record):
 @_step_of_family.implements(Smooth)
 def _step_by_stiffness(family, scene, run, h_max, tolerances, scratch):
     """Implement :func:`_step_of_family`: implicit in a stiff stiction band, by a series elsewhere."""
-    band = inf
+    band, before = inf, run.local
     # A mode relaxes fast in the stiction band alone.
     if run.mode.region < 0:
         band = stiction_band(scene.law)
         is_stiff, guard, s, y, record, control, error = _step_if_stiff(scene, run, h_max, tolerances[1], scratch)
         if is_stiff:
             record = _goes_on(scene, run, guard, record)
-            shared = max(error[1], _DAMPED * error[0])
-            local = LocalErrors(run.local.series, 0.0, 0.0, run.local.implicit + shared)
+            before_implicit, place = before.implicit + max(error[1], _DAMPED * error[0]), before.place + error[3]
+            local = LocalErrors(before.series, 0.0, 0.0, before_implicit, before.all_series, place)
             return True, guard, s, y, record, control, local
-    guard, s, y, record, shared = series_step(scene, run, h_max, tolerances[0], scratch, band)
-    local = LocalErrors(run.local.series + shared, shared, 0.0, run.local.implicit)
+    guard, s, y, record, error, shared = series_step(scene, run, h_max, tolerances[0], scratch, band)
+    all_series = before.all_series + error
+    local = LocalErrors(before.series + shared, shared, 0.0, before.implicit, all_series, before.place)
     return False, guard, s, y, _goes_on(scene, run, guard, record), start_control(scene.span), local
 
 
@@ -183,7 +192,8 @@ def _step_implicitly(family, scene, run, h_max, tolerances, scratch):
         scene, run.record, start, run.control, h_max, tolerances[1], scratch
     )
     rate = run.local.rate + error[2] / (ring.radius(scene.body) * tolerances[1])
-    return True, guard, s, y, record, control, LocalErrors(0.0, 0.0, rate, run.local.implicit + error[0])
+    local = LocalErrors(0.0, 0.0, rate, run.local.implicit + error[0], 0.0, 0.0)
+    return True, guard, s, y, record, control, local
 
 
 @feature("_step_of_family(family(scene.law), scene, run, h_max, tolerances, scratch)", of=simpler.PARTED, absorb=True)
@@ -342,7 +352,7 @@ class Results(NamedTuple):
         Outcomes. It may have no columns.
     steps : ndarray of shape ``(cells,)``
         Numbers of steps.
-    audits : ndarray of shape ``(cells, 7)`` or ``(0, 7)``
+    audits : ndarray of shape ``(cells, 9)`` or ``(0, 9)``
         Unless empty, the audit of each run: the largest violation of the friction law, in units of the violation that
         the tolerance would explain; the share of the energy turnover that is not work of friction; the rate at which
         the reaction that ended the run fell, N/s, infinite if something else did; :class:`LocalErrors`.
@@ -407,7 +417,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         record = recorder.lend(scene, recorder.begin(scene, now.t, seen), take(rows, i))
         record = recorder.after_event(scene, record, mode, mode, t)
         control = start_control(1e-6 * scene.span)
-        audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
+        audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         n = stalled = 0
         t_before, s = t, scene.span
         t_judged, least_gain = t, scene.span * (PATIENCE / max_steps)

@@ -244,6 +244,7 @@ def errors(
     force_share: float = 0.0,
     steps: Any,
     floor: Any = 0.0,
+    motion_floor: Any = 0.0,
     rate_floor: Any = 0.0,
     force_floor: Any = 0.0,
     friction_floor: Any = 0.0,
@@ -265,9 +266,9 @@ def errors(
         The same in forces and jumps, if it is larger.
     steps : ndarray of shape ``(cells,)``
         Number of steps. Their rounding accumulates.
-    floor, rate_floor : float or ndarray of shape ``(cells,)``
-        Errors that both runs share: relative errors, and errors of the rate of the place, rad/s or on a belt m/s, which
-        velocities have in addition.
+    floor, motion_floor, rate_floor : float or ndarray of shape ``(cells,)``
+        Errors that the difference does not show: relative errors; relative errors that all but forces and jumps have
+        in addition; and errors of the rate of the place, rad/s or on a belt m/s, which velocities have in addition.
     force_floor, friction_floor : float or ndarray of shape ``(cells,)``
         Relative errors that forces and jumps, and that friction itself, have in addition.
     instant_floor : float or ndarray of shape ``(cells,)``
@@ -286,6 +287,7 @@ def errors(
         least = shares * _largest(difference[:, of_motion], scale[:, of_motion])[:, None] * scale
         bound: NDArray[np.float64] = np.atleast_1d(safety)[:, None] * np.maximum(difference, least)
         bound += np.atleast_1d(floor + _ROUNDING * np.sqrt(1.0 + np.asarray(steps)))[:, None] * scale
+        bound[:, of_motion] += np.reshape(motion_floor, (-1, 1)) * scale[:, of_motion]
         units = [OUTCOMES[name].units for name in names]
         for k, unit in enumerate(units):
             if unit.endswith(" s-1"):

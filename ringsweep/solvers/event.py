@@ -43,8 +43,11 @@ _SHARED, _SHARE_OF_REACTIONS, _SHARED_REACTIONS, _ONCE_IMPLICIT = 3.0, 0.05, 0.3
 # Largest error of a run, in units of its difference from the run at the looser tolerance; shares of the largest
 # relative difference that count in every number, and in forces; and what a run errs by in any case, in units of the
 # remainder. Where friction varies with the speed, the errors of both runs are as good as independent: the ends of steps
-# decide their signs and sizes. Forces magnify them.
-_CONSTANT, _VARYING, _BRISTLES = (0.8, 0.04, 0.04, 0.2), (1.9, 0.09, 0.2, 0.4), (2.0, 0.2, 1.0, 0.2)
+# decide their signs and sizes. Forces magnify them. And all numbers may agree by chance, so that a share of the errors
+# of all steps counts too: of series, in units of the tolerance; under smooth laws also of the place in implicit steps.
+_CONSTANT, _VARYING = (0.8, 0.04, 0.04, 0.2, 0.0), (1.5, 0.05, 0.2, 0.2, 0.1)
+_SMOOTH, _BRISTLES = (1.5, 0.08, 0.2, 0.4, 0.03), (2.0, 0.2, 1.0, 0.2, 0.0)
+_PLACES = 0.5
 
 # Impacts magnify the errors before them: a small difference of two runs is then less certain by this factor.
 _MAGNIFIED = 3.0
@@ -167,7 +170,8 @@ class _Piecewise(Method):
             diverge, infinite elsewhere; whether they diverge, but a tighter tolerance may show that they converge.
         """
         batch = runs.batch
-        of_bristles = family_of(type(batch.law)) is Dynamic
+        family = family_of(type(batch.law))
+        of_bristles = family is Dynamic
         distance = apart(runs)
         diverge = diverging(distance, looser[of_bristles], distance_before)
         obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
@@ -180,8 +184,9 @@ class _Piecewise(Method):
         friction_floor = np.where(local.implicit > 0.0, implicit_tolerance, 0.0)
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         _, magnified, left_out = audit.of_events(batch, runs.named[0])
-        is_constant = family_of(type(batch.law)) is SetValued and not varies(take(batch, 0).law, 0)
-        safety, share, force_share, once = _CONSTANT if is_constant else _BRISTLES if of_bristles else _VARYING
+        is_constant = family is SetValued and not varies(take(batch, 0).law, 0)
+        of_slip = _CONSTANT if is_constant else _VARYING if family is SetValued else _SMOOTH
+        safety, share, force_share, once, share_of_steps = _BRISTLES if of_bristles else of_slip
         floor = remainder * (once + _SHARED * local.series)
         floor += implicit_tolerance * (local.implicit + (_ONCE_IMPLICIT if of_bristles else 0.0))
         # The largest reaction is that of one step, and a reaction that vanishes is that of the last.
@@ -195,6 +200,7 @@ class _Piecewise(Method):
             (~obeys_law, LAW_NOT_OBEYED),
             safety=np.where(magnified, _MAGNIFIED, 1.0) * safety,
             share=share,
+            motion_floor=tolerance * share_of_steps * local.all_series + implicit_tolerance * _PLACES * local.place,
             force_share=force_share,
             steps=steps,
             floor=floor + left_out,
@@ -232,7 +238,7 @@ class _Piecewise(Method):
         Results
         """
         cells = len(batch.span)
-        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, 7)))
+        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, 9)))
         no_history = History(np.inf, np.empty(0), np.empty((0, 0)))
         integrate(batch, tolerances or self.tolerances(), self.max_steps, results, no_history)
         return results
@@ -243,7 +249,7 @@ class _Piecewise(Method):
         size = 4 * samples
         while True:
             history = History(spacing, np.empty(size), np.empty((size, width)))
-            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 7)))
+            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 9)))
             count = integrate(batch, self.tolerances(), self.max_steps, no_results, history)
             if count < size or size >= self.max_steps:
                 return history.times[:count], history.table[:count]

@@ -91,7 +91,7 @@ def series_step(scene, run, h_max, tolerance, scratch, band):
     -------
     tuple
         The guard that ended the step, or -1; length of the step, s; state and record after it; error of the step, in
-        units of the tolerance, if a run at a looser tolerance takes the same step, 0 otherwise.
+        units of the tolerance; the same if a run at a looser tolerance takes the same step, 0 otherwise.
     """
     c = scratch.c
     longest, reach = series.fill_table(scene, run.mode, run.now, run.y, tolerance, c)
@@ -107,4 +107,4 @@ def series_step(scene, run, h_max, tolerance, scratch, band):
     # The looser run needs no shorter step up to the event, or is limited to the same length. A mode that lasts for one
     # step is one step of the looser run too.
     same = error * FACTOR < 1.0 or s == h < reach or (run.has_switched and s < h)
-    return guard, s, series.state_at(scene, c, s), record, error if same else 0.0
+    return guard, s, series.state_at(scene, c, s), record, error, error if same else 0.0
