@@ -303,6 +303,8 @@ class TestErrors:
             ("tustin", 1567, 1e-14),
             # A creep from rest to rest: by symmetry the error estimate of the step is small.
             pytest.param("bengisu-akay", 1963, 1e-11, marks=pytest.mark.slow),
+            # The greatest friction lies within a creep of one step, whose dense output is inexact.
+            pytest.param("tanh", 2318, 1e-11, marks=pytest.mark.slow),
         ],
     )
     def test_numbers_that_agree_by_chance_err_by_less_than_three_bounds(self, law, cell, rtol):

@@ -33,8 +33,9 @@ _ACCELERATION_FACTOR = 100.0
 
 
 # A polynomial through five instants of a step is too coarse to find an extreme of a quantity if it errs there by this
-# share of the change of the quantity. Then the extreme is found to this fraction of the step, by so many trials.
-_COARSE, _NEAR, _MOST_TRIALS = 1e-4, 1e-6, 40
+# share of the change of the quantity. Then the extreme is found to this fraction of the step, by so many trials. And if
+# the dense output itself errs by that share of the quantity: from values at this fraction of the step beside it.
+_COARSE, _NEAR, _MOST_TRIALS, _BESIDE = 1e-4, 1e-6, 40, 0.02
 
 # Error of the dense output at an extreme, as a share of what the extreme exceeds the ends of the step by.
 _DENSE_ERROR = 0.01
@@ -425,11 +426,12 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         view = after if fraction == 1.0 else middle
         if fraction != 0.5 and fraction != 1.0:
             view = _view_within(scene, start, scratch, taken, fraction)
-        if looks and fraction != 1.0 and _sets_record(scene, record, (before, view, after)):
-            # A step of the method is more exact than the dense output, whose error may be that of the whole step.
-            there = drives.turn_near(scene.drive, course, now, fraction * h)
-            state, _ = _step_of_method(scene, start, course, fraction * h, there, scratch.bends[1])
-            view = implicit.guards_and_motion(scene, mode, common, there, state)
+        q = _setting_record(scene, record, (before, view, after)) if looks and fraction != 1.0 else -1
+        if q >= 0:
+            last = fractions[j + 1] if j < count else 1.0
+            fraction, view = _extreme_by_method(
+                scene, record, start, scratch, taken, q, view, (fraction_before, fraction, last)
+            )
         duration = (fraction - fraction_before) * h
         ends = fraction_before, fraction
         record = along_implicit(variation.asked(scene), scene, record, start, taken, ends, scratch)
@@ -563,8 +565,40 @@ def _turn_near(scene, record, start, scratch, taken, q, value_before, turn):
 
 
 @inlined
-def _sets_record(scene, record, views):
-    """Whether a quantity in a view within a step lies beyond both ends of the step, and may set a record.
+def _view_by_method(scene, start, scratch, h):
+    """View after a step of the method of length `h`, s; more exact than the dense output of a longer step."""
+    there = drives.turn_near(scene.drive, scratch.course, start.now, h)
+    state, _ = _step_of_method(scene, start, scratch.course, h, there, scratch.bends[1])
+    return implicit.guards_and_motion(scene, start.mode, start.common, there, state)
+
+
+@inlined
+def _extreme_by_method(scene, record, start, scratch, taken, q, view, fractions):
+    """Fraction of a step at an extreme of quantity `q`, and the view there, from steps of the method.
+
+    `view` is that of the dense output where it has the extreme: the second of the `fractions`, between two other
+    instants. In a long step it errs so much that the extreme is elsewhere: at that of a parabola through three values.
+    """
+    first, fraction, last = fractions
+    dense = implicit.sought(scene, record, view)[q][0]
+    view = _view_by_method(scene, start, scratch, fraction * taken.h)
+    value = implicit.sought(scene, record, view)[q][0]
+    width = min(_BESIDE, min(fraction - first, last - fraction))
+    if abs(value - dense) <= _COARSE * abs(value) or width <= 0.0:
+        return fraction, view
+    low, high = (
+        implicit.sought(scene, record, _view_by_method(scene, start, scratch, (fraction - width) * taken.h))[q][0],
+        implicit.sought(scene, record, _view_by_method(scene, start, scratch, (fraction + width) * taken.h))[q][0],
+    )
+    bend = low - 2.0 * value + high
+    move = 0.5 * width * (low - high) / bend if bend != 0.0 else 0.0
+    fraction = min(max(fraction + move, first), last)
+    return fraction, _view_by_method(scene, start, scratch, fraction * taken.h)
+
+
+@inlined
+def _setting_record(scene, record, views):
+    """A quantity that in a view within a step lies beyond both ends of the step and may set a record; -1 for none.
 
     `views` are those at the beginning, within the step and at its end.
     """
@@ -573,10 +607,12 @@ def _sets_record(scene, record, views):
         implicit.sought(scene, record, views[1]),
         implicit.sought(scene, record, views[2]),
     )
-    found = False
+    found = -1
     for q in range(len(within)):
         (value, least, greatest), a, b = within[q], first[q][0], last[q][0]
         above, below = value - max(a, b), min(a, b) - value
-        found = found or (above > 0.0 and value + _DENSE_ERROR * above > greatest)
-        found = found or (below > 0.0 and value - _DENSE_ERROR * below < least)
+        if above > 0.0 and value + _DENSE_ERROR * above > greatest:
+            found = q
+        if below > 0.0 and value - _DENSE_ERROR * below < least:
+            found = q
     return found
