@@ -252,6 +252,32 @@ def test_a_stopped_body_slides_off_through_speeds_as_small_as_numbers_go(law):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("law", ["ruina", "dieterich"])
+def test_a_body_thrown_back_by_a_stop_does_not_fall_on_it_by_rounding(law):
+    """Launched on the belt at a stop it runs into, it has steps about as short as the place is exact; b = 0."""
+    mu_0, fast, span, pull, e = 0.3, 1e-4, 0.01, 1.3, 0.5
+    friction = {"law": law, "mu0": mu_0, "b": 0.0, "critical_distance": 1e-5, "reference_velocity": fast}
+    scene = on_belt(friction | {"a": 0.01}, 0.0, damping=0.0, velocity=-0.6, start=(-0.3, -0.6), span=span)
+    scene |= {"force": {"constant": pull}, "stops": {"low": -0.3, "restitution": e}}
+    shares, belts = np.geomspace(0.003, 0.01, 10), np.linspace(-0.8, -0.3, 5)
+    points = np.array([(a, v, v) for a in shares for v in belts]).T.tolist()
+    points = dict(zip(("friction.a", "belt.velocity", "initial.velocity"), points, strict=True))
+    found = ringsweep.run({"scene": scene, "sweep": {"points": points}}, jobs=1, progress=False)
+    moves = zip(points["friction.a"], points["belt.velocity"], found.velocity_end.values, found.x_end, strict=True)
+    for a, belt, velocity, x in moves:
+
+        def pace(v, a=a):
+            return 1.0 / (pull - G * (mu_0 + a * log(v / fast)))
+
+        ends = -(1.0 + e) * belt, velocity - belt
+        assert quad(pace, *ends)[0] == pytest.approx(span, rel=1e-7)
+        slip = quad(lambda v, pace=pace: v * pace(v), *ends)[0]
+        assert x.item() + 0.3 == pytest.approx(slip + belt * span, rel=1e-7)
+    assert (found.impacts == 1).all()
+    assert found.certified.all()
+
+
+@pytest.mark.slow
 class TestHeldOnBristles:
     """A body that rests at a stop while the belt slides under its bristles: its state tells nothing of the forces."""
 

@@ -152,11 +152,13 @@ def _impact(scene, mode, side, t, y):
     forcing, e, before = drives.turn(scene.drive, t), scene.stops.restitution, mode.stop
     velocity = moving(scene, y[1] + forcing[1], y[1], forcing[1])
     closing = side * velocity
-    x, v = scene.stops.high if side > 0 else scene.stops.low, -e * velocity - forcing[1]
+    # A body that has just rebounded may seem to lie beyond the stop by rounding of its place: it flies on.
+    rebound, hits = (e * closing, 1.0) if closing > 0.0 else (-closing, 0.0)
+    x, v = scene.stops.high if side > 0 else scene.stops.low, -side * rebound - forcing[1]
     _, at_rest = mode_at(scene, mode.place, t, (x, -forcing[1], *y[2:]))
-    if closing <= 0.0 or _is_still(y[1], velocity):
+    if _is_still(y[1], velocity):
         return _at_rest(scene, at_rest, side, before, t, y)
-    rebound, speed_max, lasts, short = e * closing, max(before.speed_max, closing), 0.0, e == 0.0
+    impacts, speed_max, lasts, short = before.impacts + hits, max(before.speed_max, closing), 0.0, rebound == 0.0
     # On a belt at rest friction turns round with the body, else the slip of the last rebounds is that at rest.
     rises, falls = (x, v, *y[2:]), (x, y[1] if forcing[1] == 0.0 else -forcing[1], *y[2:])
     _, after = mode_at(scene, mode.place, t, rises)
@@ -168,8 +170,8 @@ def _impact(scene, mode, side, t, y):
         short = rebound * rebound <= 2.0 * away * SUMMED * length
         lasts = rebound * (1.0 / away + ratio / back) / (1.0 - e * ratio)
     if short:
-        return _at_rest(scene, at_rest, side, AtStop(0, before.impacts + 1.0, speed_max, 0.0, lasts), t, y)
-    return with_stop(after, AtStop(0, before.impacts + 1.0, speed_max, -side * rebound, 0.0)), rises
+        return _at_rest(scene, at_rest, side, AtStop(0, impacts, speed_max, 0.0, lasts), t, y)
+    return with_stop(after, AtStop(0, impacts, speed_max, -side * rebound, 0.0)), rises
 
 
 # ---- series ----------------------------------------------------------------------------------
