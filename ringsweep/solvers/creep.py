@@ -583,7 +583,8 @@ def _extreme_by_method(scene, record, start, scratch, taken, q, view, fractions)
     dense = implicit.sought(scene, record, view)[q][0]
     view = _view_by_method(scene, start, scratch, fraction * taken.h)
     value = implicit.sought(scene, record, view)[q][0]
-    width = min(_BESIDE, min(fraction - first, last - fraction))
+    # No part of a step, and no step of the method, is without a length.
+    width = min(_BESIDE, 0.5 * min(fraction - first, last - fraction))
     if abs(value - dense) <= _COARSE * abs(value) or width <= 0.0:
         return fraction, view
     low, high = (
@@ -592,7 +593,7 @@ def _extreme_by_method(scene, record, start, scratch, taken, q, view, fractions)
     )
     bend = low - 2.0 * value + high
     move = 0.5 * width * (low - high) / bend if bend != 0.0 else 0.0
-    fraction = min(max(fraction + move, first), last)
+    fraction = min(max(fraction + move, 0.5 * (first + fraction)), 0.5 * (fraction + last))
     return fraction, _view_by_method(scene, start, scratch, fraction * taken.h)
 
 
