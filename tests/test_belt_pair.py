@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from refusals import refused
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -147,32 +146,3 @@ def test_a_history_of_a_pair_obeys_both_friction_laws():
     assert {("stop", 1), ("stop", 2), ("breakaway", 1), ("breakaway", 2)} <= set(
         zip(kinds.values.tolist(), run.event_contact.values.tolist(), strict=True)
     )
-
-
-@pytest.mark.parametrize(
-    ("change", "path"),
-    [
-        ({"friction": {"law": "bengisu-akay", "mu_s": 0.2, "mu_k": 0.1, "alpha": 1.0, "v0": 0.1}}, "friction.law"),
-        ({"friction": STICTION | {"mu_k_2": 0.3}}, "friction.mu_k_2"),
-        ({"friction": STICTION | {"mu_s": {"forward": 0.3, "backward": 0.2}}}, "friction.mu_s: is two numbers"),
-        ({"force": {"constant": 1.0}}, "force"),
-        ({"stops": {"high": 1.0}}, "stops"),
-        ({"zone": {"half_length": 1.0}}, "zone"),
-        ({"body": {"mass_1": 1.0}}, "body.mass_2"),
-    ],
-)
-def test_what_a_pair_does_not_take_is_refused_at_its_place(change, path):
-    refused(f"scene.{path}", ringsweep.sweep, coupled(**change), {"belt.velocity": [0.1]}, jobs=1, progress=False)
-
-
-@pytest.mark.parametrize(
-    ("extra", "path"),
-    [
-        ({"solver": {"method": "rk4", "steps": 100}}, "scene.model"),
-        ({"solver": {"method": "implicit"}}, "solver.method"),
-        ({"record": {"exponent": True}}, "record.exponent"),
-        ({"record": {"section": {"at": "turn"}}}, "record.section"),
-    ],
-)
-def test_a_method_or_record_without_a_pair_is_refused(extra, path):
-    refused(path, ringsweep.run, {"scene": coupled()} | extra, jobs=1, progress=False)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import on_belt, outcome, with_exponent
-from refusals import refused
 from solutions import period_map
 from test_functions_of_time import cells_of
 from tiers import mostly_slow
@@ -191,25 +190,6 @@ def test_a_run_that_goes_on_finds_the_zones_where_they_are_by_then(tmp_path):
     del scene["initial"]
     rest = outcome(scene | {"initial": {"from": str(first)}, "time": {"span": 1.7}})
     np.testing.assert_allclose([rest.x_end, rest.velocity_end], [whole.x_end, whole.velocity_end], atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"belt": {"velocity": 0.0}}, "scene.belt.period: missing"),
-        ({"belt": {"velocity": 0.0, "period": 0.1}}, "half_length: 0.1 m is longer than half of belt.period"),
-        ({"friction": {"law": "karnopp", "dead_band": 0.1}}, "scene.zones.0: not available with law karnopp"),
-        ({"friction": {"frame": "body"}}, "scene.friction.frame: .*is no frame of zones"),
-        ({"zones": [{"from": 0.1, "to": 0.2}]}, "half_length"),
-        ({"initial": {"steady": "slip"}}, "scene.initial.steady: not available with zones"),
-    ],
-)
-def test_mistakes_are_located(change, words):
-    scene = with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1))
-    merged = {**scene, **change}
-    if "friction" in change:
-        merged["friction"] = {**scene["friction"], **change["friction"]}
-    refused(words, ringsweep.sweep, merged, {}, progress=False)
 
 
 @pytest.mark.parametrize("load", [None, {"formula": "Q*sin(u*t)", "Q": "1 N", "u": f"{np.pi} rad/s"}])

@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 from belts import on_belt, with_all_parts, with_exponent
-from refusals import refused
 from solutions import growth
-
-import ringsweep
 
 #: A body on any spring, with a damper and a force, under a set-valued law.
 FORCED = on_belt(
@@ -162,20 +159,3 @@ def test_the_record_changes_no_other_outcome():
     angles = {f"multiplier{of}_{k}" for of in ("", "_angle") for k in (1, 2)}
     assert added == {"lyapunov", "lyapunov_error", *angles}
     assert asked.drop_vars(added).equals(plain)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"solver": {"method": "rk4", "steps": 1000}}, "solver.method: rk4 locates no events"),
-        ({"record": {"exponent": "yes"}}, "record.exponent: true or false is expected"),
-        ({"record": {"exponents": True}}, "record.exponents: unknown key; did you mean `exponent`?"),
-        (
-            {"scene": FORCED | {"time": {"span": 1.0}, "friction": {"law": "bristle", "mu_k": 0.3, "sigma0": 100.0}}},
-            "record.exponent: friction law bristle has none",
-        ),
-    ],
-)
-def test_what_has_no_exponent_is_refused(change, said):
-    config = {"scene": FORCED | {"time": {"span": 1.0}}, "record": {"exponent": True}}
-    assert str(refused(None, ringsweep.run, config | change)).startswith(said)

@@ -350,29 +350,3 @@ class TestParts:
         assert period(0.2, 0.3) == pytest.approx(10.0)
         assert period(1.0, sqrt(2.0)) == np.inf
         assert period(0.4, 0.0) == 2.5
-
-    #: Times of a table, and forces at these times.
-    TIMES, FORCES = {"time": [0.0, 1.0, 2.0, 20.0]}, {"force": [1.0] * 4}
-
-    @pytest.mark.parametrize(
-        ("force", "message"),
-        [
-            ({"amplitude": 1.0}, r"force\.frequency: missing: a force with amplitude needs it"),
-            ({"phase": 1.0, "frequency": 1.0}, r"force\.amplitude: missing"),
-            ({"amplitude": "1 m", "frequency": 1.0}, r"force\.amplitude.*wrong unit.*is in N"),
-            ({"amplitude": 1.0, "frequency": -1.0}, r"force\.frequency.*at least 0"),
-            ({"law": "harmonic"}, r"force\.law: unknown key"),
-            (3.0, r"force: a section is expected"),
-            (TIMES, r"force\.force: missing"),
-            (FORCES | {"time": [0.0, 1.0, 2.0, 3.0]}, r"time\.span: 10 s is longer than the table of the force"),
-            (TIMES | {"force": [1.0] * 3}, r"force\.force: 3 values, but time has 4"),
-            (TIMES | FORCES | {"frequency": 1.0}, r"force\.frequency: cannot stand beside"),
-            ({"file": "no.csv"}, r"force\.file.*no\.csv"),
-            (TIMES | FORCES | {"interpolate": "spline"}, r"interpolate: 'spline' is no interpolation of a force"),
-            ({"amplitude": 1.0, "frequency": 1.0, "interpolate": "linear"}, r"force\.time: missing: a table needs"),
-            ({"formula": "A*sin(w*t)", "interpolate": "linear"}, r"interpolate: cannot stand beside"),
-            ({"formula": "A*floor(sin(w*t))", "A": 1.0, "w": 1.0}, r"formula: .*floor takes a straight line in t"),
-        ],
-    )
-    def test_force_that_makes_no_sense_is_refused_by_its_path(self, force, message):
-        refused(message, ringsweep.simulate, self.plain(force=force))

@@ -6,7 +6,6 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refused
 from rings import bump, course, particle, rubs, shape
 from scipy.optimize import linprog
 from tiers import mostly_slow
@@ -546,24 +545,6 @@ class TestBothContactsStick:
             if ends is not None:
                 compared += 1
                 np.testing.assert_allclose(found, np.mean(ends, axis=0), rtol=1e-8, atol=1e-8 * found.max())
-
-
-class TestRefused:
-    @pytest.mark.parametrize(
-        ("change", "solver", "problem"),
-        [
-            ({}, {"method": "rk4", "steps": 100}, "rk4 does not go on after a contact is lost"),
-            ({"friction": {"law": "dahl", "sigma0": 1e5} | {k: BODY["friction"][k] for k in ("rough", "rest")}}, "auto",
-             "bristles, which have no state in an impact"),
-            ({"impact": {"restitution": 1.5}}, "auto", "must be at least 0 and at most 1"),
-            ({"impact": {}}, "auto", "restitution: missing"),
-            ({"drive": {"law": "formula", "theta": "amplitude*abs(sin(w*t))", "w": 8.0}}, "auto",
-             "the angular velocity jumps"),
-            ({"body": BODY["body"] | {"inertia": 0}}, "auto", "cannot turn on one contact"),
-        ],
-    )  # fmt: skip
-    def test_what_has_no_impact_is_refused_with_its_place(self, change, solver, problem):
-        refused(problem, ringsweep.sweep, BODY | change, {"drive.amplitude": [1.0]}, solver=solver, progress=False)
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from belts import on_belt, outcome
-from refusals import refused
 from test_functions_of_time import cells_of
 
 import ringsweep
@@ -66,19 +65,3 @@ def test_the_table_of_a_load_has_a_factor():
     cells = cells_of(braked(table))
     assert cells.drive.added.knots[0, 0, 1].tolist() == [0.0, 1.0, 4.0, -5.0]
     assert (cells.drive.added.amplitude, cells.drive.least_load) == (1.5, -7.5)
-    refused(r"body\.load\.time: missing: a table needs a file", cells_of, braked({"amplitude": 2.0}))
-
-
-@pytest.mark.parametrize(
-    ("load", "words"),
-    [
-        ("5 N", "scene.body.load: a section is expected"),
-        ({"formula": "A*sin(w*t)", "w": 1}, "scene.body.load.A: missing"),
-        ({"formula": "A*floor(t)"}, "scene.body.load.formula"),
-        ({"formula": "A*t", "A": 1, "file": "load.csv"}, "scene.body.load.file: cannot stand beside a formula"),
-        ({"time": [0, 1], "load": [1, 2]}, "table of the body.load, which ends at 1 s"),
-        ({"time": [0, 10], "load": [1]}, "scene.body.load.load: 1 values, but time has 2"),
-    ],
-)
-def test_mistakes_are_located(load, words):
-    refused(words, ringsweep.sweep, braked(load), {}, progress=False)

@@ -1,4 +1,4 @@
-"""What a person types wrongly about samples, thresholds and fits: each mistake is told in one line, before any run."""
+"""What a person types wrongly: each mistake is told in one line with its place, before any run."""
 
 import re
 from pathlib import Path
@@ -7,6 +7,17 @@ from typing import Any
 import pytest
 from belts import on_belt
 from refusals import refused
+from test_belt_pair import STICTION, coupled
+from test_belt_zones import with_zones
+from test_functions_of_time import by
+from test_impact import BODY
+from test_load_in_time import braked
+from test_rate_and_state import dragged
+from test_ring_long_run import RIG, ROCKING
+from test_section import BRISTLES, FORCED
+from test_steady import launched
+from test_stops import KARNOPP, between
+from test_two_way_friction import by_formula, conveyor, two_way
 
 import ringsweep
 from ringsweep import InputError
@@ -185,11 +196,6 @@ def test_mistake_in_a_sample(changed: dict[str, Any], path: str, words: str) -> 
     located(lambda: load({"scene": BELT, "sweep": {"sample": SAMPLE | changed}}), path, words)
 
 
-def test_path_that_is_sampled_and_swept() -> None:
-    sweep = {"sample": SAMPLE, "grid": {"friction.mu_s": [0.1, 0.2]}}
-    located(lambda: load({"scene": BELT, "sweep": sweep}), "sweep.sample.of.friction.mu_s", "one place only")
-
-
 @pytest.mark.parametrize(("vary", "between", "others", "words"), THRESHOLDS)
 def test_mistake_in_a_threshold(vary: str, between: Any, others: dict[str, Any], words: str) -> None:
     given = {"regime": "riding", "between": between} | others
@@ -227,18 +233,193 @@ def test_plain_end_of_an_interval_beside_another_unit_is_told(caplog: pytest.Log
 
 
 POWER = {"drive": {"law": "power", "amplitude": "2 m", "exponent": 1.1}, "belt": None}
+TURN, PERIODS = {"at": "turn"}, {"at": "period"}
+EXPONENT = {"exponent": True}
+RK4 = {"method": "rk4", "steps": 1000}
+GRID = {"grid": {"belt.velocity": [0.1, 0.2, 0.3]}}
+SPANS = {"grid": {"time.span": [1.0, 2.0]}, "follow": "time.span"}
+SIDEWAYS = {"axis": "belt.velocity", "direction": "sideways"}
+EVEN, ARCTAN = ({"law": law, "amplitude": 1.0} for law in ("constant", "arctan"))
+LUGRE = {"law": "lugre", "sigma0": 2000.0, "sigma1": 5.0, "sigma2": 0.0, "v_s": 0.01}
+BRISTLE = {"law": "bristle", "mu_k": 0.3, "sigma0": 100.0}
+IN_TIME = {"formula": "A*sin(w*t)", "w": 1}
+TIMES, FORCES = {"time": [0.0, 1.0, 2.0, 20.0]}, {"force": [1.0] * 4}
+MU = {"mu_s": 0.3, "mu_k": 0.1}
+
+#: Sound configurations.
+PLAIN: dict[str, Any] = {"scene": BELT}
+ZONES: dict[str, Any] = {"scene": with_zones([(0.3, 0.1, 0.5, 0.4)], (0.2, 0.1))}
+ZONED = ZONES["scene"]["friction"]
+LOAD: dict[str, Any] = {"scene": braked(IN_TIME | {"A": 1})}
+FLOOR: dict[str, Any] = {"scene": conveyor(STICTION)}
+AGEING: dict[str, Any] = {"scene": dragged("dieterich", 1e-3, 1.0, span=1.0)}
+SECTION: dict[str, Any] = {"scene": FORCED, "record": {"section": PERIODS}}
+STOPS: dict[str, Any] = {"scene": between(-1.0, 1.0, mu_k=0.1, span=1.0)}
+STEADY: dict[str, Any] = {"scene": launched({"law": "coulomb", "mu_k": 0.3})}
+PAIR: dict[str, Any] = {"scene": coupled()}
+IMPACT: dict[str, Any] = {"scene": BODY}
+ROCKS: dict[str, Any] = {"scene": RIG, "record": {"section": PERIODS}}
+BALL: dict[str, Any] = {"scene": ROCKING, "sweep": SPANS}
+
+# A sound configuration, the sections that replace those of its scene or beside it (None leaves one out), and the line.
+CONFIGURATIONS: list[tuple[dict[str, Any], dict[str, Any], str]] = [
+    *(
+        (PLAIN, {"sweep": {"grid": {"body.mass": axis}}}, f"sweep.grid.body.mass{said}")
+        for axis, said in (
+            ({"logspace": [1, 2, 3]}, ": ; did you mean `geomspace`, from the"),
+            ({"linspce": [1, 2, 3]}, ": ; did you mean `linspace`, from the"),
+            ({"linspace": [5, "6 g", 8]}, ".linspace: in g: give both a unit"),
+        )
+    ),
+    (PLAIN, {"scene": BELT | {"solver": RK4}}, "scene.solver: the section `solver` stands beside `scene`, not in it"),
+    (PLAIN, POWER, "scene.drive.amplitude: its unit is m/s^p with the exponent p, so write 2 for 2 m/s^p"),
+    (PLAIN, {"sweep": {"sample": SAMPLE, "grid": {"friction.mu_s": [0.1, 0.2]}}}, f"{OF}: one place only"),
+    (PLAIN, {"sweep": GRID | {"refine": {"strid": 8}}}, "sweep.refine.strid: did you mean `stride`"),
+    (PLAIN, {"sweep": GRID | {"refine": {"stride": 0}}}, "sweep.refine.stride: at least 1"),
+    (PLAIN, {"sweep": GRID | {"refine": {"audit": 2}}}, "sweep.refine.audit: at most 1"),
+    (PLAIN, {"sweep": GRID | {"refine": 3}}, "sweep.refine: a section with keys"),
+    (PLAIN, {"sweep": GRID | {"follow": "belt.velocty"}}, "sweep.follow: did you mean"),
+    (PLAIN, {"sweep": GRID | {"follow": SIDEWAYS}}, "sweep.follow.direction: both"),
+    (PLAIN, {"sweep": GRID | {"follow": {"axes": 1}}}, "sweep.follow.axes: did you mean"),
+    (PLAIN, {"sweep": GRID | {"follow": "belt.velocity", "refine": True}}, "sweep.refine: follow"),
+    (PLAIN, {"sweep": SPANS, "friction": BRISTLE}, "sweep.follow: more than a deflection"),
+    (PLAIN, {"sweep": SPANS, "belt": None, "drive": ARCTAN}, "sweep.follow: no phase"),
+    (PLAIN, {"initial": {"x": 1.0, "from": "a.nc"}}, "scene.initial.x: leave one out"),
+    ({"scene": BRISTLES}, {"initial": {"deflection": 1.0}}, "scene.initial.deflection: up to 0.0015 m"),
+    (PLAIN, {"initial": {"from": "no.nc"}}, "scene.initial.from: no.nc"),
+    (PLAIN, {"force": {"amplitude": 1.0}}, "scene.force.frequency: missing: a force with amplitude needs it"),
+    (PLAIN, {"force": {"phase": 1.0, "frequency": 1.0}}, "scene.force.amplitude: missing"),
+    (PLAIN, {"force": {"amplitude": "1 m", "frequency": 1.0}}, "scene.force.amplitude: wrong unit"),
+    (PLAIN, {"force": {"amplitude": 1.0, "frequency": -1.0}}, "scene.force.frequency: at least 0"),
+    (PLAIN, {"force": {"law": "harmonic"}}, "scene.force.law: unknown key"),
+    (PLAIN, {"force": 3.0}, "scene.force: a section is expected"),
+    (PLAIN, {"force": TIMES}, "scene.force.force: missing"),
+    (PLAIN, {"force": FORCES | {"time": [0, 1, 2, 3]}}, "scene.time.span: 7 s is longer than the table of the force"),
+    (PLAIN, {"force": TIMES | {"force": [1.0] * 3}}, "scene.force.force: 3 values, but time has 4"),
+    (PLAIN, {"force": TIMES | FORCES | {"frequency": 1.0}}, "scene.force.frequency: cannot stand beside"),
+    (PLAIN, {"force": {"file": "no.csv"}}, "scene.force.file: no.csv"),
+    (PLAIN, {"force": TIMES | FORCES | {"interpolate": "spline"}}, "scene.force.interpolate: 'spline' is no interpol"),
+    (PLAIN, {"force": {"amplitude": 1, "frequency": 1, "interpolate": "linear"}}, "scene.force.time: missing: a table"),
+    (PLAIN, {"force": IN_TIME | {"interpolate": "linear"}}, "scene.force.interpolate: cannot stand beside"),
+    (PLAIN, {"force": {"formula": "A*floor(sin(t))", "A": 1}}, "scene.force.formula: floor takes a straight line in t"),
+    (ZONES, {"belt": {"velocity": 0.0}}, "scene.belt.period: missing"),
+    (ZONES, {"belt": {"velocity": 0.0, "period": 0.1}}, "scene.zones.0.half_length: 0.1 m is longer than half of belt"),
+    (ZONES, {"friction": ZONED | KARNOPP}, "scene.zones.0: not available with law karnopp"),
+    (ZONES, {"friction": ZONED | {"frame": "body"}}, "scene.friction.frame: is no frame of zones"),
+    (ZONES, {"zones": [{"from": 0.1, "to": 0.2}]}, "scene.zones.0.from: half_length"),
+    (ZONES, {"initial": {"steady": "slip"}}, "scene.initial.steady: not available with zones"),
+    *(
+        (LOAD, {"body": {"mass": 1.0, "load": load}}, f"scene.{said}")
+        for load, said in (
+            ("5 N", "body.load: a section is expected"),
+            (IN_TIME, "body.load.A: missing"),
+            ({"formula": "A*floor(t)"}, "body.load.formula: units do not fit in t"),
+            ({"formula": "A*t", "A": 1, "file": "load.csv"}, "body.load.file: cannot stand beside a formula"),
+            ({"time": [0, 1], "load": [1, 2]}, "time.span: table of the body.load, which ends at 1 s"),
+            ({"time": [0, 10], "load": [1]}, "body.load.load: 1 values, but time has 2"),
+            ({"amplitude": 2.0}, "body.load.time: missing: a table needs a file"),
+        )
+    ),
+    *(
+        (FLOOR, {"friction": friction}, f"scene.friction.{said}")
+        for friction, said in (
+            ({"law": "stiction", "mu_s": {"forward": 0.3}, "mu_k": 0.1}, "mu_s.backward: missing"),
+            ({"law": "stiction", "mu_s": {"up": 0.3}, "mu_k": 0.1}, "mu_s.up: unknown key"),
+            (two_way((0.3, 0.2), (0.1, 0.2)), "mu_k.backward: 0.2 exceeds mu_s"),
+            (BRISTLE | {"mu_k": {"forward": 0.3, "backward": 0.2}}, "mu_k: not available with law bristle"),
+            (by_formula("mu_k*piecewise(direction > 1, 1, 2)", **MU), "mu: such as v < v1, or is direction > 0"),
+            (by_formula("mu_k*(1 + direction*v)", **MU), "mu: units do not fit"),
+            (
+                by_formula("mu_k*(2 - direction)", mu_s=0.3, mu_k=0.2),
+                "law: begins to slip with friction 0.6, more than",
+            ),
+            (by_formula("mu_k", **MU, direction=1.0), "direction: unknown key"),
+        )
+    ),
+    (AGEING, {"friction": AGEING["scene"]["friction"] | {"a": 0.0}}, "scene.friction.a: 0 is not allowed"),
+    (AGEING, {"initial": {"contact_age": "-1 s"}}, "scene.initial.contact_age: must be greater than 0 s"),
+    (
+        AGEING,
+        {"model": "ring-single-contact"},
+        "scene.friction.law: is not a friction law of model ring-single-contact",
+    ),
+    (SECTION, {"record": {"section": {"keep": 3}}}, "record.section.at: missing: instant of a section"),
+    (SECTION, {"record": {"section": {"at": "periods"}}}, "record.section.at: 'periods' is no instant of a section"),
+    (SECTION, {"record": {"section": TURN | {"kept": 3}}}, "record.section.kept: unknown key; did you mean `keep`?"),
+    (SECTION, {"record": {"section": TURN | {"keep": 0}}}, "record.section.keep: 0 is not allowed"),
+    (SECTION, {"record": {"section": "turn"}}, "record.section: a section with keys is expected"),
+    (SECTION, {"force": None}, "record.section.at: neither force nor drive has a period"),
+    (SECTION, {"record": {"section": TURN | {"period": 2.0}}}, "record.section.period: belongs to `at: period`"),
+    (SECTION, {"record": {"section": PERIODS | {"period": 2.0}}}, "record.section.period: force or drive have"),
+    (SECTION, {"record": {"section": PERIODS | {"period": 0.0}}}, "record.section.period: 0 s is not allowed"),
+    (SECTION, {"solver": RK4}, "solver.method: rk4 locates no instants for record.section"),
+    (SECTION, {"sweep": GRID | {"refine": True}}, "sweep.refine: cannot stand beside record.section"),
+    (
+        SECTION,
+        {"sweep": {"sample": SAMPLE | {"of": {"body.mass": {"uniform": [1, 2]}}}}},
+        "sweep.sample: cannot stand beside record.section",
+    ),
+    (SECTION, {"solver": RK4, "record": EXPONENT}, "solver.method: rk4 locates no events"),
+    (SECTION, {"record": {"exponent": "yes"}}, "record.exponent: true or false is expected"),
+    (SECTION, {"record": {"exponents": True}}, "record.exponents: unknown key; did you mean `exponent`?"),
+    (SECTION, {"friction": BRISTLE, "record": EXPONENT}, "record.exponent: friction law bristle has none"),
+    (STOPS, {"stops": {"restitution": 0.5}}, "scene.stops: low or high is missing"),
+    (STOPS, {"stops": {"low": 0.3, "high": 0.1, "restitution": 0.5}}, "scene.stops.low: not below stops.high"),
+    (STOPS, {"stops": {"high": -0.1, "restitution": 0.5}}, "scene.initial.x: 0 m is above stops.high"),
+    (STOPS, {"stops": {"high": 0.1}}, "scene.stops.restitution: missing"),
+    (STOPS, {"stops": {"high": 0.1, "restitution": 1.5}}, "scene.stops.restitution: 1.5"),
+    (STOPS, {"solver": RK4}, "solver.method: does not rebound from stops"),
+    (STOPS, {"friction": KARNOPP | {"dead_band": 0.6}}, "scene.friction.dead_band: less than the speed of the belt"),
+    (STEADY, {"belt": {"velocity": 0.0}}, "scene.initial.steady: a belt at 0 m/s does not slide along"),
+    (STEADY, {"initial": {"steady": "stick"}}, "scene.initial.steady: 'stick' is no steady motion (known: slip)"),
+    *(
+        (STEADY, {"initial": {"steady": "slip", name: 1}}, f"scene.initial.{name}: cannot stand beside initial.steady")
+        for name in ("x", "velocity", "contact_age")
+    ),
+    (STEADY, {"body": LOAD["scene"]["body"]}, "scene.initial.steady: a normal load that does not"),
+    (STEADY, {"spring": {"stiffness": 0.0}}, "scene.initial.steady: the spring cannot hold the body against 2.943 N"),
+    (STEADY, {"spring": {"stiffness": 20.0, "cubic": -1e5}}, "scene.initial.steady: cannot hold the body"),
+    (
+        STEADY,
+        {"body": {"mass": 1.0, "normal_stiffness": -1e3}, "force": {"constant": 1e3}},
+        "scene.initial.steady: normal load would be -",
+    ),
+    (STEADY, {"belt": None, "drive": ARCTAN}, "scene.initial.steady: needs a belt of constant velocity"),
+    (STEADY, {"friction": KARNOPP | {"dead_band": 0.2}}, "scene.initial.steady: a belt at 0.2 m/s does not"),
+    (STEADY, {"friction": BRISTLE}, "scene.initial.steady: bristles of friction law bristle have no st"),
+    (STEADY, {"sweep": GRID | {"follow": "belt.velocity"}}, "sweep.follow: cannot stand beside initial.steady"),
+    (PAIR, {"friction": KARNOPP}, "scene.friction.law: is not a friction law of model belt-pair"),
+    (PAIR, {"friction": STICTION | {"mu_k_2": 0.3}}, "scene.friction.mu_k_2: 0.3 exceeds the static"),
+    (PAIR, {"friction": two_way((0.3, 0.2), (0.2, 0.1))}, "scene.friction.mu_s: is two numbers"),
+    (PAIR, {"force": {"constant": 1.0}}, "scene.force: unknown key"),
+    (PAIR, {"stops": {"high": 1.0}}, "scene.stops: unknown key"),
+    (PAIR, {"zone": {"half_length": 1.0}}, "scene.zone: unknown key"),
+    (PAIR, {"body": {"mass_1": 1.0}}, "scene.body.mass_2: missing"),
+    (PAIR, {"solver": RK4}, "scene.model: which solver rk4 needs"),
+    (PAIR, {"solver": {"method": "implicit"}}, "solver.method: implicit does not take friction law stiction"),
+    (PAIR, {"record": EXPONENT}, "record.exponent: model belt-pair has none"),
+    (PAIR, {"record": {"section": TURN}}, "record.section: model belt-pair has none"),
+    (IMPACT, {"solver": RK4}, "solver.method: rk4 does not go on after a contact is lost"),
+    (IMPACT, {"friction": BODY["friction"] | LUGRE}, "scene.impact: bristles, which have no state in an impact"),
+    (IMPACT, {"impact": {"restitution": 1.5}}, "scene.impact.restitution: must be at least 0 and at most 1"),
+    (IMPACT, {"impact": {}}, "scene.impact.restitution: missing"),
+    (IMPACT, {"drive": by("A*abs(sin(w*t))", A=3.0, w=8.0)}, "scene.drive.theta: the angular velocity jumps"),
+    (IMPACT, {"body": BODY["body"] | {"inertia": 0}}, "scene.body.inertia: cannot turn on one contact"),
+    (IMPACT, {"friction": by_formula("mu_k*direction", rough=MU, rest=MU)}, "scene.friction.law: cannot depend on the"),
+    (IMPACT, {"initial": {"steady": "slip"}}, "scene.initial.steady: unknown key"),
+    (ROCKS, {"record": {"section": TURN}}, "record.section.at: 'turn' is no instant of a section"),
+    (ROCKS, {"drive": EVEN, "record": EXPONENT}, "record.exponent: neither force nor drive has a period"),
+    (ROCKS, {"impact": {"restitution": 0.5}}, "record.section: cannot stand beside scene.impact"),
+    (ROCKS, {"friction": RIG["friction"] | LUGRE, "record": EXPONENT}, "record.exponent: law lugre has none on a ring"),
+    (BALL, {"impact": {"restitution": 0.5}}, "sweep.follow: leave impact out"),
+    (BALL, {"friction": ROCKING["friction"] | LUGRE}, "sweep.follow: choose another law"),
+]
 
 
-@pytest.mark.parametrize(
-    ("changed", "grid", "path", "words"),
-    [
-        ({}, {"body.mass": {"logspace": [1, 2, 3]}}, "sweep.grid.body.mass", "; did you mean `geomspace`, from the"),
-        ({}, {"body.mass": {"linspce": [1, 2, 3]}}, "sweep.grid.body.mass", "; did you mean `linspace`, from the"),
-        ({}, {"body.mass": {"linspace": [5, "6 g", 8]}}, "sweep.grid.body.mass.linspace", "in g: give both a unit"),
-        ({"solver": {"method": "auto"}}, {}, "scene.solver", "the section `solver` stands beside `scene`, not in it"),
-        (POWER, {}, "scene.drive.amplitude", "its unit is m/s^p with the exponent p, so write 2 for 2 m/s^p"),
-    ],
-)
-def test_mistake_in_a_configuration(changed: dict[str, Any], grid: Any, path: str, words: str) -> None:
-    scene = {key: value for key, value in (BELT | changed).items() if value is not None}
-    located(lambda: load({"scene": scene} | ({"sweep": {"grid": grid}} if grid else {})), path, words)
+@pytest.mark.parametrize(("sound", "changed", "said"), CONFIGURATIONS)
+def test_mistake_in_a_configuration(sound: dict[str, Any], changed: dict[str, Any], said: str) -> None:
+    config = sound | {key: part for key, part in changed.items() if key in ("scene", "record", "solver", "sweep")}
+    scene = config["scene"] | {key: part for key, part in changed.items() if key not in config}
+    config["scene"] = {key: part for key, part in scene.items() if part is not None}
+    path, _, words = said.partition(": ")
+    assert refused(re.escape(words), ringsweep.run, config, jobs=1, progress=False).path == path

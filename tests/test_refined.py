@@ -157,20 +157,6 @@ class TestReuse:
 
 
 class TestConfiguration:
-    @pytest.mark.parametrize(
-        ("refine", "path", "problem"),
-        [
-            ({"strid": 8}, "sweep.refine.strid", "did you mean `stride`"),
-            ({"stride": 0}, "sweep.refine.stride", "at least 1"),
-            ({"audit": 2}, "sweep.refine.audit", "at most 1"),
-            (3, "sweep.refine", "a section with keys"),
-        ],
-    )
-    def test_mistake_is_refused_with_its_place(self, scene, refine, path, problem):
-        grid = {name: values.tolist() for name, values in AXES.items()}
-        config = {"scene": scene, "sweep": {"grid": grid, "refine": refine}}
-        assert refused(problem, ringsweep.run, config).path == path
-
     def test_points_and_shared_dimensions_are_refused(self, scene):
         points = {"points": {"drive.amplitude": [1.0, 2.0]}, "grid": {"zone.half_angle": [0.1, 0.2]}, "refine": True}
         refused("only a grid can be refined", ringsweep.run, {"scene": scene, "sweep": points})

@@ -6,7 +6,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refused
 from rings import course, particle, rubs, shape
 from solutions import growth, period_map
 
@@ -28,8 +27,6 @@ RIG = (
     | rubs("stiction", rest=(0.2, 0.1), rough=(0.5, 0.3))
     | course("sinusoidal", 0.6, 1.3, phi=0.3, omega=0.0, span=60.0 / 1.3)
 )
-
-LUGRE = {"law": "lugre", "sigma0": 2000.0, "sigma1": 5.0, "sigma2": 0.0, "v_s": 0.01}
 
 
 def section(keep=8, exponent=True, **period):
@@ -103,18 +100,6 @@ def test_rocking_ring_has_two_motions_at_one_frequency_chosen_by_the_past():
     assert set(ringsweep.words(found.long_run).values.ravel().tolist()) == {"periodic"}
     apart = np.abs(found.phi_section.sel(direction="up") - found.phi_section.sel(direction="down")).max("section")
     assert (apart.values > 0.1).tolist() == [False, False, False, True, False]
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"impact": {"restitution": 0.5}}, "leave impact out"),
-        ({"friction": ROCKING["friction"] | LUGRE}, "choose another law"),
-    ],
-)
-def test_runs_whose_state_is_more_than_place_and_speed_cannot_go_on(change, words):
-    sweep = {"grid": {"time.span": [1.0, 2.0]}, "follow": "time.span"}
-    assert refused(words, ringsweep.run, {"scene": ROCKING | change, "sweep": sweep}).path == "sweep.follow"
 
 
 @pytest.mark.slow
@@ -233,26 +218,6 @@ def test_full_turns_do_not_count():
     assert np.abs(found.phi_section.values).max() <= np.pi
     assert word(found) == "periodic"
     assert found.period.item() == pytest.approx(2.0)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"record": {"section": {"at": "turn"}}}, "record.section.at: 'turn' is no instant of a section"),
-        (
-            {"scene": RIG | {"drive": {"law": "constant", "amplitude": 1.0}}, "record": {"exponent": True}},
-            "record.exponent: neither force nor drive has a period",
-        ),
-        ({"scene": RIG | {"impact": {"restitution": 0.5}}}, "record.section: cannot stand beside scene.impact"),
-        (
-            {"scene": RIG | {"friction": RIG["friction"] | LUGRE}, "record": {"exponent": True}},
-            "record.exponent: friction law lugre has none on a ring",
-        ),
-    ],
-)
-def test_what_has_no_section_is_refused(change, said):
-    config = deepcopy({"scene": RIG, "record": {"section": {"at": "period"}}} | change)
-    assert str(refused(None, ringsweep.run, config)).startswith(said)
 
 
 def test_attractors_of_a_ring_are_motions_on_a_circle():

@@ -5,8 +5,6 @@ from copy import deepcopy
 import numpy as np
 import pytest
 from belts import by_scipy, on_belt, with_all_parts
-from refusals import refused
-from rings import edited
 
 import ringsweep
 from ringsweep import cli
@@ -112,31 +110,3 @@ def test_sweep_over_laws_has_no_deflection_where_the_law_has_no_bristles():
     assert np.isnan(ds.deflection_section[0]).all()
     assert np.isfinite(ds.deflection_section[1]).all()
     assert np.isfinite(ds.x_section).all()
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"record": {"section": {"keep": 3}}}, "record.section.at: missing: instant of a section"),
-        ({"record": {"section": {"at": "periods"}}}, "record.section.at: 'periods' is no instant of a section"),
-        ({"record": {"section": {"at": "turn", "kept": 3}}}, "record.section.kept: unknown key; did you mean `keep`?"),
-        ({"record": {"section": {"at": "turn", "keep": 0}}}, "record.section.keep: 0 is not allowed"),
-        ({"record": {"section": "turn"}}, "record.section: a section with keys is expected"),
-        ({"scene": edited(FORCED, force=None)}, "record.section.at: neither force nor drive has a period"),
-        ({"record": {"section": {"at": "turn", "period": 2.0}}}, "record.section.period: belongs to `at: period`"),
-        ({"record": {"section": {"at": "period", "period": 2.0}}}, "record.section.period: force or drive have"),
-        ({"record": {"section": {"at": "period", "period": 0.0}}}, "record.section.period: 0 s is not allowed"),
-        ({"solver": {"method": "rk4", "steps": 1000}}, "solver.method: rk4 locates no instants for record.section"),
-        (
-            {"sweep": {"grid": {"belt.velocity": [0.1, 0.2, 0.3]}, "refine": True}},
-            "sweep.refine: cannot stand beside record.section",
-        ),
-        (
-            {"sweep": {"sample": {"n": 8, "seed": 1, "of": {"friction.mu_k": {"uniform": [0.1, 0.2]}}}}},
-            "sweep.sample: cannot stand beside record.section",
-        ),
-    ],
-)  # fmt: skip
-def test_what_has_no_section_is_refused(change, said):
-    config = {"scene": FORCED, "record": {"section": {"at": "period"}}} | change
-    assert str(refused(None, ringsweep.run, config)).startswith(said)

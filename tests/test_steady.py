@@ -5,11 +5,9 @@ from math import exp
 import numpy as np
 import pytest
 from belts import on_belt
-from refusals import refused
 from solutions import cell_of
 
 import ringsweep
-from ringsweep.errors import InputError
 from ringsweep.physics.friction.bristles import stribeck
 
 G = 9.81
@@ -111,37 +109,3 @@ class TestHopfBifurcation:
             found = self.found(launched(law, v_b=v_b, span=4e-3 / v_b), "spring.stiffness", (100.0, 20000.0))
             exact = G * 0.005 / 1e-4 * (1.0 + v_b**2 / (G * 0.01 * 1e-4))
             assert found.spring_stiffness.item() == pytest.approx(exact, rel=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"belt": {"velocity": 0.0}}, r"initial\.steady: a belt at 0 m/s does not slide along"),
-        ({"initial": {"steady": "stick"}}, r"initial\.steady: 'stick' is no steady motion \(known: slip\)"),
-        ({"initial": {"steady": "slip", "x": 0.1}}, r"initial\.x: cannot stand beside initial\.steady"),
-        ({"initial": {"steady": "slip", "velocity": 0.1}}, r"initial\.velocity: cannot stand beside initial\.steady"),
-        ({"initial": {"steady": "slip", "contact_age": 1}}, r"initial\.contact_age: cannot stand beside"),
-        ({"body": {"mass": 1.0, "load": {"formula": "A*sin(w*t)", "A": 1, "w": 1}}}, "a normal load that does not"),
-        ({"spring": {"stiffness": 0.0}}, r"initial\.steady: .*the spring cannot hold the body against 2\.943 N"),
-        ({"spring": {"stiffness": 20.0, "cubic": -1e5}}, r"initial\.steady: .*cannot hold the body"),
-        ({"body": {"mass": 1.0, "normal_stiffness": -1e3}, "force": {"constant": 1e3}}, r"normal load would be -"),
-        (
-            {"belt": {}, "drive": {"law": "power", "amplitude": 1.0, "exponent": 2.0}},
-            "needs a belt of constant velocity",
-        ),
-        ({"friction": {"law": "karnopp", "mu_s": 0.5, "mu_k": 0.3, "dead_band": 0.2}}, "a belt at 0.2 m/s does not"),
-        ({"friction": {"law": "bristle", "mu_k": 0.3, "sigma0": 1e4}}, "bristles of friction law bristle have no st"),
-    ],
-)
-def test_scene_without_steady_slip_is_refused_by_its_path(change, message):
-    refused(message, cell_of, launched({"law": "coulomb", "mu_k": 0.3}) | change)
-
-
-def test_chain_of_cells_cannot_start_at_steady_slip():
-    sweep = {"grid": {"belt.velocity": [0.1, 0.2]}, "follow": "belt.velocity"}
-    with pytest.raises(InputError, match=r"sweep\.follow: cannot stand beside initial\.steady"):
-        ringsweep.run({"scene": launched({"law": "coulomb", "mu_k": 0.3}), "sweep": sweep})
-
-
-def test_ring_has_no_such_launch(scene):
-    refused(r"scene\.initial\.steady: unknown key", cell_of, scene | {"initial": {"steady": "slip"}})

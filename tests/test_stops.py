@@ -5,7 +5,6 @@ from math import atan, log, pi, sqrt
 import numpy as np
 import pytest
 from belts import on_belt, outcome, with_all_parts, with_exponent
-from refusals import refused
 from scipy.integrate import quad
 from tiers import mostly_slow
 
@@ -333,29 +332,3 @@ class TestExponent:
         scene = between(-0.1, 0.05, 0.4, mu_k=0.02, stiffness=2.0, velocity=0.25, force=(0.9, 0.25), span=400.0)
         found = with_exponent(scene)
         assert (found.multiplier_1, found.multiplier_2, found.lyapunov) == (0.0, 0.0, -np.inf)
-
-
-class TestMistakes:
-    """Scenes that cannot be run are refused with the path and the cause."""
-
-    @pytest.mark.parametrize(
-        ("change", "options", "path", "cause"),
-        [
-            ({"stops": {"restitution": 0.5}}, {}, "scene.stops", "low or high is missing"),
-            ({"stops": {"low": 0.3, "high": 0.1, "restitution": 0.5}}, {}, "scene.stops.low", "not below stops.high"),
-            ({"stops": {"high": -0.1, "restitution": 0.5}}, {}, "scene.initial.x", "0 m is above stops.high"),
-            ({"stops": {"high": 0.1}}, {}, "scene.stops.restitution", "missing"),
-            ({"stops": {"high": 0.1, "restitution": 1.5}}, {}, "scene.stops.restitution", "1.5"),
-            ({}, {"solver": {"method": "rk4", "steps": 100}}, "solver.method", "does not rebound from stops"),
-            (
-                {"friction": KARNOPP | {"dead_band": 0.6}},
-                {},
-                "scene.friction.dead_band",
-                "less than the speed of the belt",
-            ),
-        ],
-    )
-    def test_the_message_says_where_and_why(self, change, options, path, cause):
-        scene = between(-1.0, 1.0, mu_k=0.1, span=1.0) | change
-        error = str(refused(None, ringsweep.sweep, scene, {"time.span": [1.0]}, **options))
-        assert (error.startswith(path), cause in error) == (True, True), error

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import on_belt, outcome
-from refusals import refused
 from scipy.optimize import brentq
 
 import ringsweep
@@ -182,29 +181,3 @@ def test_a_formula_may_end_in_one_direction_only():
     fields = hidden_fields(EXPRESSIONS[found], {"w": np.array([2.0])}, surfaces)
     assert np.isinf(fields["thresholds"]).all()
     assert fields["thresholds_back"].min() == pytest.approx(2.0)
-
-
-@pytest.mark.parametrize(
-    ("friction", "words"),
-    [
-        ({"law": "stiction", "mu_s": {"forward": 0.3}, "mu_k": 0.1}, "scene.friction.mu_s.backward: missing"),
-        ({"law": "stiction", "mu_s": {"up": 0.3}, "mu_k": 0.1}, "scene.friction.mu_s.up: unknown key"),
-        (two_way((0.3, 0.2), (0.1, 0.2)), "scene.friction.mu_k.backward: 0.2 exceeds mu_s"),
-        (
-            {"law": "bristle", "mu_k": {"forward": 0.3, "backward": 0.2}, "sigma0": 1e4},
-            "scene.friction.mu_k: not available with law bristle",
-        ),
-        (by_formula("mu_k*piecewise(direction > 1, 1, 2)", mu_s=0.3, mu_k=0.1), "such as v < v1, or is direction > 0"),
-        (by_formula("mu_k*(1 + direction*v)", mu_s=0.3, mu_k=0.1), "scene.friction.mu: .* units do not fit"),
-        (by_formula("mu_k*(2 - direction)", mu_s=0.3, mu_k=0.2), "it begins to slip with friction 0.6, more than"),
-        (by_formula("mu_k", mu_s=0.3, mu_k=0.2, direction=1.0), "scene.friction.direction"),
-    ],
-)
-def test_mistakes_are_located(friction, words):
-    refused(words, ringsweep.sweep, conveyor(friction), {}, progress=False)
-
-
-def test_a_formula_of_the_direction_is_refused_beside_impact():
-    scene = on_ring("ring", by_formula("mu_k*(2 - direction)", elsewhere={"mu_s": 0.6, "mu_k": 0.2}))
-    problem = "scene.friction.law: friction cannot depend on the direction of sliding beside impact"
-    refused(problem, ringsweep.simulate, scene | {"impact": {"restitution": 0.5}})
