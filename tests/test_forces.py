@@ -18,10 +18,6 @@ from ringsweep.physics import drives
 from ringsweep.physics.forces import Forced
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 
-G = 9.81
-SMALL_STEPS = {"method": "rk4", "steps": 20_000}
-EXACT = {"method": "event", "rtol": 1e-13, "certify": False}
-
 
 def forced(law="stiction", *, friction=0.0, load=0.0, v_b=0.0, span=10.0, force=None, k=1.0, cubic=0.0, c=0.0, x=0.0,
            v=None):  # fmt: skip

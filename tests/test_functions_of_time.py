@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import refusals
 import yaml
 from scipy.integrate import quad, solve_ivp
 
@@ -76,10 +75,6 @@ def series_of(drive, t, order=18):
     theta = np.empty(order + 1)
     drives.expand(drive, t, order, theta, np.full((SERIES_ROWS, order + 1), np.nan))
     return theta
-
-
-def refused(scene):
-    return str(refusals.refused(None, cells_of, scene))
 
 
 #: Each drive of the package, and a formula for the same motion.
@@ -196,21 +191,6 @@ class TestVelocity:
         assert drives.turn(drive, 1.7)[0] == pytest.approx(place, rel=1e-13)
         assert drives.next_knot(drive, 1.5) - 1.5 > drives.next_knot(drive, 0.99) - 0.99
 
-    @pytest.mark.parametrize(
-        ("section", "message"),
-        [
-            ({"velocity": "V*sin(t*t/T/T)", "V": 1, "T": 1}, "drive.velocity: .*its integral is not known: known"),
-            ({"velocity": "V*log(1 + t/T)", "V": 1, "T": 1}, "drive.velocity: .*; give theta"),
-            ({"velocity": "V*sign(sin(w*t))", "V": 1, "w": 1}, "drive.velocity: .*not known.* a triangle wave"),
-            ({"velocity": "velocity*sin(w*t)", "w": 1}, "drive.velocity: is the formula: give its parameter another"),
-            ({"velocity": "V*sin(w*t)", "theta": "A*sin(w*t)", "A": 1, "V": 1, "w": 1}, "cannot stand beside theta"),
-            ({"velocity": "V*sin(w*t)", "V": "1 rad", "w": 1}, "drive.V: .*wrong unit: .* is in rad/s"),
-            ({"velocity": 2.0}, "drive.velocity: 2.0: a formula is a text"),
-        ],
-    )  # fmt: skip
-    def test_mistakes_are_told_by_the_path_of_the_velocity(self, section, message):
-        assert re.search(message, refused(ring({"law": "formula"} | section)))
-
     def test_parameter_of_a_place_may_be_called_velocity(self):
         drive = take(drive_of(by("velocity*t", velocity=0.7)), 0)
         assert drives.turn(drive, 2.0)[:2] == (1.4, 0.7)
@@ -229,25 +209,6 @@ class TestSwitches:
             for t in (0.2, 0.7, 1.1):
                 np.testing.assert_allclose(drives.turn(drive, t), drives.turn(ramp, t), rtol=1e-14)
                 np.testing.assert_allclose(series_of(drive, t), series_of(ramp, t), rtol=1e-14)
-
-    @pytest.mark.parametrize(
-        ("drive", "message"),
-        [
-            (by("piecewise(t < t1, a*t, 3*a*t/2)", a=2.0, t1=1.0), "the angle jumps from 2 rad to 3 rad at t = 1 s"),
-            (by("A*sign(cos(w*t))", A=2.0, w=2.0), "the angle jumps from 2 rad to -2 rad at t = 0.785398 s"),
-            (by("A*(t/T - floor(t/T))", A=2.0, T=0.9), "the angle jumps from 2 rad to 0 rad at t = 0.9 s"),
-            (by("A*max(sin(w*t), t/T)", A=2.0, w=5e4, T=9.0), "the times of its switches are not found: within"),
-            (by("A*floor(2*sin(w*t))", A=2.0, w=1.0), "floor takes a straight line in t, such as floor(t/T)"),
-            (by("A*floor(sin(t))", A=2.0), "floor takes a straight line in t, such as floor(t/T)"),
-            (by("A*t*floor(A/A)", A=2.0), "floor of an expression without t: write the number itself"),
-            (by("A*t**1.5", A=2.0), "its first derivative is no finite number at t = 0 s"),
-            (by("A*log(t/T)", A=2.0, T=1.0), "the formula is no finite number at t = 0 s"),
-        ],
-    )
-    def test_drive_that_is_not_smooth_enough_is_refused_with_place_and_sizes(self, drive, message):
-        found = refused(ring(drive))
-        assert found.startswith(f"scene.drive.theta: {drive['theta']!r}: ")
-        assert message in found
 
     def test_jump_is_told_if_it_is_within_the_span_of_a_cell(self):
         drive = by("a*piecewise(t < t1, 0*t, t)", a=2.0, t1=5.0)
@@ -280,25 +241,6 @@ class TestUnits:
         np.testing.assert_allclose([drive.A, drive.w, drive.f], [[np.pi / 2], [np.pi], [2.0]])
         moved = cells_of(belt(by("v*t + A*(1 - exp(-t/tau))", v="30 cm/s", A="3 cm", tau="200 ms"))).drive
         np.testing.assert_allclose([moved.v, moved.A, moved.tau], [[0.3], [0.03], [0.2]])
-
-    @pytest.mark.parametrize(
-        ("section", "message"),
-        [
-            (by("A*t", A="2 s"), "scene.drive.A: '2 s' has the wrong unit: parameter A of the drive is in rad/s"),
-            (by("A*t + B*exp(t)", A=1.0, B=1.0), "units do not fit in t: s and 1 (t is in s)"),
-            (by("A*t", A=1.0, tau=1.0), "scene.drive.tau: unknown key"),
-            (by("A*t"), "scene.drive.A: missing: parameter A of the drive, in rad/s"),
-            (by("A*sine(t)", A=1.0), "sine is not a known function (allowed: numbers, t, names of parameters"),
-            (by("A*t^2", A=1.0), "powers are written **"),
-            (by("A*theta", A=1.0), "theta cannot be the name of a parameter"),
-            (by("A", A=1.0), "it must depend on t"),
-            (by(3.0), "a formula is a text such as A*sin(w*t), got float"),
-            ({"law": "formula"}, "scene.drive.theta: missing: the formula of the motion"),
-            (by("A*piecewise(A < 1, t, 0)", A=1.0), "a condition compares t with a parameter, such as t < t1"),
-        ],
-    )
-    def test_mistakes_are_told_with_path_and_cause(self, section, message):
-        assert message in refused(ring(section))
 
 
 class TestPeriods:
@@ -357,6 +299,3 @@ class TestForces:
     def test_formula_stands_beside_no_other_force_but_a_constant(self):
         force = {"formula": "P*sin(w*t)", "P": 1.0, "w": 1.0, "constant": 2.0}
         assert cells_of(belt(force=force)).drive.constant == 2.0
-        assert "scene.force.amplitude: cannot stand beside" in refused(belt(force=force | {"amplitude": 1.0}))
-        table = {"time": [0, 1, 2, 3], "force": [0] * 4}
-        assert "scene.force.time: cannot stand beside" in refused(belt(force=force | table))

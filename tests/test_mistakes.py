@@ -9,7 +9,7 @@ from belts import on_belt
 from refusals import refused
 from test_belt_pair import STICTION, coupled
 from test_belt_zones import with_zones
-from test_functions_of_time import by
+from test_functions_of_time import by, ring
 from test_impact import BODY
 from test_load_in_time import braked
 from test_rate_and_state import dragged
@@ -242,6 +242,7 @@ SIDEWAYS = {"axis": "belt.velocity", "direction": "sideways"}
 EVEN, ARCTAN = ({"law": law, "amplitude": 1.0} for law in ("constant", "arctan"))
 LUGRE = {"law": "lugre", "sigma0": 2000.0, "sigma1": 5.0, "sigma2": 0.0, "v_s": 0.01}
 BRISTLE = {"law": "bristle", "mu_k": 0.3, "sigma0": 100.0}
+FORMULA = {"law": "formula"}
 IN_TIME = {"formula": "A*sin(w*t)", "w": 1}
 TIMES, FORCES = {"time": [0.0, 1.0, 2.0, 20.0]}, {"force": [1.0] * 4}
 MU = {"mu_s": 0.3, "mu_k": 0.1}
@@ -259,6 +260,7 @@ STEADY: dict[str, Any] = {"scene": launched({"law": "coulomb", "mu_k": 0.3})}
 PAIR: dict[str, Any] = {"scene": coupled()}
 IMPACT: dict[str, Any] = {"scene": BODY}
 ROCKS: dict[str, Any] = {"scene": RIG, "record": {"section": PERIODS}}
+ROUND: dict[str, Any] = {"scene": ring(by("A*t", A=1.0))}
 BALL: dict[str, Any] = {"scene": ROCKING, "sweep": SPANS}
 
 # A sound configuration, the sections that replace those of its scene or beside it (None leaves one out), and the line.
@@ -300,6 +302,8 @@ CONFIGURATIONS: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     (PLAIN, {"force": {"file": "no.csv"}}, "scene.force.file: no.csv"),
     (PLAIN, {"force": TIMES | FORCES | {"interpolate": "spline"}}, "scene.force.interpolate: 'spline' is no interpol"),
     (PLAIN, {"force": {"amplitude": 1, "frequency": 1, "interpolate": "linear"}}, "scene.force.time: missing: a table"),
+    (PLAIN, {"force": IN_TIME | {"A": 1, "amplitude": 1.0}}, "scene.force.amplitude: cannot stand beside"),
+    (PLAIN, {"force": IN_TIME | TIMES | FORCES}, "scene.force.time: cannot stand beside"),
     (PLAIN, {"force": IN_TIME | {"interpolate": "linear"}}, "scene.force.interpolate: cannot stand beside"),
     (PLAIN, {"force": {"formula": "A*floor(sin(t))", "A": 1}}, "scene.force.formula: floor takes a straight line in t"),
     (ZONES, {"belt": {"velocity": 0.0}}, "scene.belt.period: missing"),
@@ -329,10 +333,7 @@ CONFIGURATIONS: list[tuple[dict[str, Any], dict[str, Any], str]] = [
             (BRISTLE | {"mu_k": {"forward": 0.3, "backward": 0.2}}, "mu_k: not available with law bristle"),
             (by_formula("mu_k*piecewise(direction > 1, 1, 2)", **MU), "mu: such as v < v1, or is direction > 0"),
             (by_formula("mu_k*(1 + direction*v)", **MU), "mu: units do not fit"),
-            (
-                by_formula("mu_k*(2 - direction)", mu_s=0.3, mu_k=0.2),
-                "law: begins to slip with friction 0.6, more than",
-            ),
+            (by_formula("mu_k*(4 - direction)", **MU), "law: it begins to slip with friction 0.5, more than"),
             (by_formula("mu_k", **MU, direction=1.0), "direction: unknown key"),
         )
     ),
@@ -411,6 +412,38 @@ CONFIGURATIONS: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     (ROCKS, {"drive": EVEN, "record": EXPONENT}, "record.exponent: neither force nor drive has a period"),
     (ROCKS, {"impact": {"restitution": 0.5}}, "record.section: cannot stand beside scene.impact"),
     (ROCKS, {"friction": RIG["friction"] | LUGRE, "record": EXPONENT}, "record.exponent: law lugre has none on a ring"),
+    *(
+        (ROUND, {"drive": drive}, f"scene.drive.{said}")
+        for drive, said in (
+            (FORMULA | {"velocity": "V*sin(t*t/T/T)", "V": 1, "T": 1}, "velocity: its integral is not known: known"),
+            (FORMULA | {"velocity": "V*log(1 + t/T)", "V": 1, "T": 1}, "velocity: ; give theta"),
+            (FORMULA | {"velocity": "V*sign(sin(w*t))", "V": 1, "w": 1}, "velocity: a triangle wave"),
+            (FORMULA | {"velocity": "velocity*sin(w*t)", "w": 1}, "velocity: is the formula: give its parameter"),
+            (by("A*t", A=1, velocity="V*t", V=1), "velocity: cannot stand beside theta"),
+            (FORMULA | {"velocity": "V*sin(w*t)", "V": "1 rad", "w": 1}, "V: has the wrong unit"),
+            (FORMULA | {"velocity": 2.0}, "velocity: 2.0: a formula is a text"),
+            (by("piecewise(t < t1, a*t, 3*a*t/2)", a=2.0, t1=1.0), "theta: jumps from 2 rad to 3 rad at t = 1 s"),
+            (by("A*sign(cos(w*t))", A=2.0, w=2.0), "theta: the angle jumps from 2 rad to -2 rad at t = 0.785398 s"),
+            (by("A*(t/T - floor(t/T))", A=2.0, T=0.9), "theta: the angle jumps from 2 rad to 0 rad at t = 0.9 s"),
+            (by("A*max(sin(w*t), t/T)", A=2.0, w=5e4, T=9.0), "theta: the times of its switches are not found: within"),
+            (by("A*floor(2*sin(w*t))", A=2.0, w=1.0), "theta: floor takes a straight line in t, such as floor(t/T)"),
+            (by("A*floor(sin(t))", A=2.0), "theta: floor takes a straight line in t, such as floor(t/T)"),
+            (by("A*t*floor(A/A)", A=2.0), "theta: floor of an expression without t: write the number itself"),
+            (by("A*t**1.5", A=2.0), "theta: 'A*t**1.5': its first derivative is no finite number at t = 0 s"),
+            (by("A*log(t/T)", A=2.0, T=1.0), "theta: 'A*log(t/T)': the formula is no finite number at t = 0 s"),
+            (by("A*t", A="2 s"), "A: '2 s' has the wrong unit: parameter A of the drive is in rad/s"),
+            (by("A*t + B*exp(t)", A=1.0, B=1.0), "theta: units do not fit in t: s and 1 (t is in s)"),
+            (by("A*t", A=1.0, tau=1.0), "tau: unknown key"),
+            (by("A*t"), "A: missing: parameter A of the drive, in rad/s"),
+            (by("A*sine(t)", A=1.0), "theta: sine is not a known function (allowed: numbers, t, names of parameters"),
+            (by("A*t^2", A=1.0), "theta: powers are written **"),
+            (by("A*theta", A=1.0), "theta: theta cannot be the name of a parameter"),
+            (by("A", A=1.0), "theta: it must depend on t"),
+            (by(3.0), "theta: a formula is a text such as A*sin(w*t), got float"),
+            (FORMULA, "theta: missing: the formula of the motion"),
+            (by("A*piecewise(A < 1, t, 0)", A=1.0), "theta: a condition compares t with a parameter, such as t < t1"),
+        )
+    ),
     (BALL, {"impact": {"restitution": 0.5}}, "sweep.follow: leave impact out"),
     (BALL, {"friction": ROCKING["friction"] | LUGRE}, "sweep.follow: choose another law"),
 ]
