@@ -19,6 +19,7 @@ from ringsweep.models.interface.audit import least_scales, of_events, same_stati
 from ringsweep.quantities.flags import (
     ANSWERS_DIFFER,
     CERTIFIED,
+    CHAOTIC,
     CLOSE_CALL,
     DIVERGES,
     FAILED,
@@ -168,10 +169,12 @@ def judged(
     found = errors(runs, **bounds)
     found[diverge] = np.nan
     if "lyapunov" in outcomes:
-        # What a run tells of the error of its exponent is the scatter of the growth, without the errors of its steps.
+        # What a run tells of the error of its exponent is the scatter of the growth, without the errors of its steps. By
+        # that scatter two runs of a chaotic motion differ.
         column = outcomes.index("lyapunov_error")
         with np.errstate(invalid="ignore"):
-            of_steps = np.where(diverge, 0.0, bounds["safety"] * abs(one.lyapunov - other.lyapunov))
+            of_steps = bounds["safety"] * abs(one.lyapunov - other.lyapunov)
+        of_steps[diverge | (one.long_run == CHAOTIC)] = 0.0
         rows[:, column] += np.nan_to_num(of_steps, posinf=0.0)
     return because, found
 
