@@ -77,6 +77,10 @@ class LocalErrors(NamedTuple):
     place: float
 
 
+#: Numbers of the audit of a run; see :class:`Results`.
+AUDITED = 3 + len(LocalErrors._fields)
+
+
 class Run(NamedTuple):
     """A run between two steps.
 
@@ -352,7 +356,7 @@ class Results(NamedTuple):
         Outcomes. It may have no columns.
     steps : ndarray of shape ``(cells,)``
         Numbers of steps.
-    audits : ndarray of shape ``(cells, 9)`` or ``(0, 9)``
+    audits : ndarray of shape ``(cells, AUDITED)`` or ``(0, AUDITED)``
         Unless empty, the audit of each run: the largest violation of the friction law, in units of the violation that
         the tolerance would explain; the share of the energy turnover that is not work of friction; the rate at which
         the reaction that ended the run fell, N/s, infinite if something else did; :class:`LocalErrors`.

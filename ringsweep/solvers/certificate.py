@@ -169,8 +169,8 @@ def judged(
     found = errors(runs, **bounds)
     found[diverge] = np.nan
     if "lyapunov" in outcomes:
-        # What a run tells of the error of its exponent is the scatter of the growth, without the errors of its steps. By
-        # that scatter two runs of a chaotic motion differ.
+        # What a run tells of the error of its exponent is the scatter of the growth, without the errors of its steps.
+        # Two runs of a chaotic motion differ by that scatter.
         column = outcomes.index("lyapunov_error")
         with np.errstate(invalid="ignore"):
             of_steps = bounds["safety"] * abs(one.lyapunov - other.lyapunov)

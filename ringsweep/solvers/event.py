@@ -23,7 +23,7 @@ from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_
 from ringsweep.physics.friction.velocity import varies
 from ringsweep.quantities.flags import CERTIFIED, FAILED, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.solvers.automaton import PATIENCE, History, LocalErrors, Results, integrate
+from ringsweep.solvers.automaton import AUDITED, PATIENCE, History, LocalErrors, Results, integrate
 from ringsweep.solvers.certificate import TwoRuns, apart, diverging, judged, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Result
 from ringsweep.solvers.steps import FACTOR
@@ -238,7 +238,7 @@ class _Piecewise(Method):
         Results
         """
         cells = len(batch.span)
-        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, 9)))
+        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, AUDITED)))
         no_history = History(np.inf, np.empty(0), np.empty((0, 0)))
         integrate(batch, tolerances or self.tolerances(), self.max_steps, results, no_history)
         return results
@@ -249,7 +249,7 @@ class _Piecewise(Method):
         size = 4 * samples
         while True:
             history = History(spacing, np.empty(size), np.empty((size, width)))
-            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 9)))
+            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, AUDITED)))
             count = integrate(batch, self.tolerances(), self.max_steps, no_results, history)
             if count < size or size >= self.max_steps:
                 return history.times[:count], history.table[:count]
