@@ -136,7 +136,7 @@ THRESHOLD = "threshold", "case.yaml", "--path", "drive.amplitude", "--regime", "
     ("arguments", "message"),
     [
         (["run"], "the following arguments are required: CONFIG.yaml"),
-        (["run", "case.yaml", "--jobs", "0"], "argument --jobs: 0 is not allowed: the number must be at least 1"),
+        (["run", "case.yaml", "--jobs", "0"], "argument --jobs: 0 is not allowed: a count must be at least 1"),
         (["run", "case.yaml", "--jobs", "two"], "argument --jobs: 'two' is not a number"),
         (["run", "case.yaml", "--jobs=1.5"], "argument --jobs: '1.5' is not a whole number"),
         (["plot", "run.nc", "--from", "1 m"], "argument --from: '1 m' has the wrong unit: the time is in s"),

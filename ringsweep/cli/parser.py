@@ -222,7 +222,7 @@ class _Parser(argparse.ArgumentParser):
         super().error(shortened(message, 1000))
 
 
-def _number(name: str = "the number", unit: str = "1", **interval: Any) -> Callable[[str], float]:
+def _number(name: str, unit: str = "1", **interval: Any) -> Callable[[str], float]:
     """What makes a number in an interval of an argument, which may have a unit."""
 
     def read(text: str) -> float:
@@ -238,8 +238,8 @@ def _number(name: str = "the number", unit: str = "1", **interval: Any) -> Calla
     return read
 
 
-_COUNT = _number(lower=1, upper=10**9, whole=True)
-_POSITIVE = _number(lower=0, open_lower=True)
+_COUNT = _number("a count", lower=1, upper=10**9, whole=True)
+_POSITIVE = _number("an error", lower=0, open_lower=True)
 _TIME = _number("the time", "s")
 
 # Of an option that may be repeated.
