@@ -87,6 +87,9 @@ def settled(stops, scene, stop, t, y, status, mode):
     # Rounding does not lift a body that has rested at a stop before the velocity of the belt jumped.
     still = stop.rests != 0 or _is_still(y[1], moving(scene, y[1] + forcing[1], y[1], forcing[1]))
     if status == RUNNING and side != 0 and still:
+        if y[1] != -forcing[1]:
+            # A velocity that is zero but for rounding has decided the mode.
+            _, mode = mode_at(scene, mode.place, t, (y[0], -forcing[1], *y[2:]))
         mode, y = _at_rest(scene, mode, side, stop, t, y)
         return status, mode, y
     return status, with_stop(mode, stop), y
