@@ -305,10 +305,13 @@ class TestErrors:
             pytest.param("bengisu-akay", 1963, 1e-11, marks=pytest.mark.slow),
             # The greatest friction lies within a creep of one step, whose dense output is inexact.
             pytest.param("tanh", 2318, 1e-11, marks=pytest.mark.slow),
+            # The greatest friction lies at the elastic limit of bristles, in the last part of a step of both runs.
+            pytest.param("elasto-plastic", 1497, 1e-11, marks=pytest.mark.slow),
         ],
     )
     def test_numbers_that_agree_by_chance_err_by_less_than_three_bounds(self, law, cell, rtol):
-        kind, name = Kind("belt", law, force="harmonic", span=(2.0, 20.0)), law.split("-")[0]
+        span = (1.0, 8.0) if law == "elasto-plastic" else (2.0, 20.0)
+        kind, name = Kind("belt", law, force="harmonic", span=span), law.split("-")[0]
         run = in_order(random_scenes(kind, 4000, np.random.default_rng([1, *name.encode()])), np.array([cell]))
         method = "event" if law == "tustin" else "implicit"
         found, exact = run.outcomes(), run.outcomes(solver={"method": method, "rtol": rtol})

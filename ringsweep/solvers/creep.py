@@ -17,7 +17,6 @@ from ringsweep.models.interface import implicit, modes, recorder, variation
 from ringsweep.numerics.clock import Instant, later
 from ringsweep.numerics.series import ORDER, ascending, crossings, differentiate
 from ringsweep.physics import drives
-from ringsweep.physics.friction.presliding import bend_speed
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.steps import FACTOR
 from ringsweep.solvers.variation import along_implicit, enter_implicit
@@ -39,11 +38,6 @@ _COARSE, _NEAR, _MOST_TRIALS, _BESIDE = 1e-4, 1e-6, 40, 0.02
 
 # Error of the dense output at an extreme, as a share of what the extreme exceeds the ends of the step by.
 _DENSE_ERROR = 0.01
-
-
-# Sliding speeds, in units of that at which friction bends: where friction is level; and the least at the end of a step
-# that begins there. The bend must not lie in the last part of a step, where few stages of the method see it.
-_LEVEL, _LEAST_FROM_LEVEL = 3.0, 2.0
 
 
 class Start(NamedTuple):
@@ -361,8 +355,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     s = min(control.h, h_max)
     drives.follow(scene.drive, course, now, s)
     # `h` is the length of the next attempt: `s`, or less up to the `event` that a step of length `s` has shown.
-    event, h, near, slowed = -1, s, False, False
-    bend, speed = bend_speed(scene.law), abs(x[1])
+    event, h, near, divided = -1, s, False, False
     before = implicit.guards_and_motion(scene, mode, common, forcing, x)
     for _ in range(400):
         end = drives.turn_near(scene.drive, course, now, h)
@@ -373,10 +366,10 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             s = h = h * max(_MOST_DECREASE, 0.9 * h_norm**-0.2)
             event = -1
             continue
-        speed_next = abs(x_next[1])
-        if bend > 0.0 and speed > _LEVEL * bend and speed_next < _LEAST_FROM_LEVEL * bend:
-            s = h = h * (speed - 0.5 * (_LEVEL + _LEAST_FROM_LEVEL) * bend) / (speed - speed_next)
-            event, slowed = -1, True
+        part = implicit.part_before_bend(scene, mode, common, x, x_next)
+        if part < 1.0:
+            s = h = h * part
+            event, divided = -1, True
             continue
         taken = Taken(h, x_next)
         middle = _view_within(scene, start, scratch, taken, 0.5)
@@ -401,8 +394,8 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         near = False
     else:
         return -1, -1.0, y, record, control, (0.0, 0.0, 0.0, 0.0)
-    shared = h < s or s == h_max or slowed or control.shared
-    control = _next_control(control, s, error_norm, s == h_max or slowed, s < min(control.h, h_max))
+    shared = h < s or s == h_max or divided or control.shared
+    control = _next_control(control, s, error_norm, s == h_max or divided, s < min(control.h, h_max))
     if event >= 0:
         event += scratch.first_guard
         if h == 0.0:

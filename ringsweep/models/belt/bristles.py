@@ -26,6 +26,7 @@ from ringsweep.physics.belt import BristleBelt, laden
 from ringsweep.physics.forces import force_in, load_rate
 from ringsweep.physics.friction.presliding import (
     after_yield,
+    part_before_bend,
     region_guard,
     scales,
     shown,
@@ -150,6 +151,13 @@ def _region_guards_on_bristle_belt(scene, mode, common, x):
     _, v, z = x
     sign, scene = float(mode.sign), in_segment(scene.surface, scene, mode.place)
     return sign * v, region_guard(scene.law, *coefficients(scene, sign), v, z, sign, mode.region)
+
+
+@implicit.part_before_bend.implements(BristleBelt)
+def _part_before_bend_on_bristle_belt(scene, mode, common, x, x_next):
+    """Implement :func:`implicit.part_before_bend`."""
+    sign, scene = float(mode.sign), in_segment(scene.surface, scene, mode.place)
+    return part_before_bend(scene.law, *coefficients(scene, sign), *x[1:], sign, *x_next[1:])
 
 
 @implicit.error_scales.implements(BristleBelt)

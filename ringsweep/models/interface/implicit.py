@@ -216,6 +216,26 @@ def held_guard(scene, mode, tolerance, motion):
     return -1, 1.0
 
 
+@hook(optional=True)
+def part_before_bend(scene, mode, common, x, x_next):
+    """Part of a step at which it should end: by default 1, less if it would not see that friction bends.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    common : tuple
+        What :func:`common` returned for the state at the beginning of the step.
+    x, x_next : tuple of float
+        States of an implicit step, at its beginning and at its end.
+
+    Returns
+    -------
+    float
+    """
+    return 1.0
+
+
 @hook
 def near_zero(scene, motion):
     """How near to zero each guard may come before the solver looks for a root within the step.

@@ -39,7 +39,7 @@ from ringsweep.models.sliding import rate_at_rest
 from ringsweep.models.slip import Slip, bundled, region_guards, slip, slip_at
 from ringsweep.numerics.functions import select, sine_cosine_from
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.bristles import region_guard, steady_deflection
+from ringsweep.physics.friction.presliding import part_before_bend, region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.physics.friction.ways import along, towards
 from ringsweep.physics.ring import BristleRing
@@ -169,6 +169,14 @@ def _region_guards_on_bristle_ring(scene, mode, common, x):
     _, v, z_1, z_2 = x
     sign = float(mode.sign)
     return sign * v, _region_guard(scene, common.surfaces, v, z_1, z_2, sign, mode.region)
+
+
+@implicit.part_before_bend.implements(BristleRing)
+def _part_before_bend_on_bristle_ring(scene, mode, common, x, x_next):
+    """Implement :func:`implicit.part_before_bend`: the smaller part of both contacts."""
+    (_, v, z_1, z_2), (_, v_next, z_1_next, z_2_next), sign = x, x_next, float(mode.sign)
+    first = part_before_bend(scene.law, *common.surfaces[:2], v, z_1, sign, v_next, z_1_next)
+    return min(first, part_before_bend(scene.law, *common.surfaces[2:], v, z_2, sign, v_next, z_2_next))
 
 
 @implicit.error_scales.implements(BristleRing)

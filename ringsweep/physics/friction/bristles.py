@@ -23,9 +23,9 @@ from ringsweep.physics.friction.presliding import (
     SIGMA_2,
     V_S,
     after_yield,
-    bend_speed,
     bristle,
     initial_deflection,
+    part_before_bend,
     region_guard,
     steady_deflection,
     stick_speed,
@@ -196,10 +196,34 @@ def _stribeck_stick_speed(law, recoil):
     return min(law.v_s, recoil)
 
 
-@bend_speed.implements(LuGre, ElastoPlastic)
-def _stribeck_bend_speed(law):
-    """Implement :func:`bend_speed`."""
-    return law.v_s
+# Sliding speeds, in units of the Stribeck velocity: where friction is level; and the least at the end of a step that
+# begins there. The bend must not lie in the last part of a step, where few stages of the method see it.
+_LEVEL, _LEAST_FROM_LEVEL = 3.0, 2.0
+
+
+@part_before_bend.implements(LuGre)
+@inlined
+def _part_before_stribeck_speed(law, mu_s, mu_k, v, z, sign, v_next, z_next):
+    """Implement :func:`part_before_bend`: friction rises towards the Stribeck velocity."""
+    speed, speed_next, part = abs(v), abs(v_next), 1.0
+    if speed > _LEVEL * law.v_s and speed_next < _LEAST_FROM_LEVEL * law.v_s:
+        part = (speed - 0.5 * (_LEVEL + _LEAST_FROM_LEVEL) * law.v_s) / (speed - speed_next)
+    return part
+
+
+# How near to its elastic limit a step leaves a bristle, as a share of the distance to steady sliding.
+_AT_LIMIT = 1e-3
+
+
+@part_before_bend.implements(ElastoPlastic)
+def _part_before_elastic_limit(law, mu_s, mu_k, v, z, sign, v_next, z_next):
+    """Implement :func:`part_before_bend`: bristles that leave the elastic range begin to slide, and friction falls."""
+    part = _part_before_stribeck_speed(law, mu_s, mu_k, v, z, sign, v_next, z_next)
+    load, load_next, elastic = law.sigma0 * sign * z, law.sigma0 * sign * z_next, law.elastic_fraction * mu_k
+    near = _AT_LIMIT * (mu_k - elastic)
+    if load < elastic - near and load_next > elastic + near:
+        part = min(part, (elastic - load) / (load_next - load))
+    return part
 
 
 class ResetIntegrator(NamedTuple):

@@ -112,9 +112,17 @@ def stick_speed(law, recoil):
 
 
 @hook(optional=True)
-def bend_speed(law):
-    """Sliding speed at which friction bends, and far above which it is level, m/s; by default 0: there is none."""
-    return 0.0
+def part_before_bend(law, mu_s, mu_k, v, z, sign, v_next, z_next):
+    """Part of a step at which it should end: 1, or less if friction bends in a way that the step would not see.
+
+    Parameters
+    ----------
+    law, mu_s, mu_k, v, z, sign
+        As for :func:`bristle`, at the beginning of the step.
+    v_next, z_next : float
+        Sliding velocity, m/s, and deflection, m, at its end.
+    """
+    return 1.0
 
 
 @hook(optional=True)
