@@ -200,6 +200,25 @@ def test_random_bodies_between_stops_move_along_parabolas():
     np.testing.assert_allclose(np.array([found.x_end, found.velocity_end]).T, own[:, :2], atol=1e-10)
 
 
+class TestBounds:
+    """Errors of runs whose impacts magnify each difference."""
+
+    def test_bounds_hold_where_impacts_magnify_what_both_runs_share(self):
+        """Between narrow stops all steps end at impacts, whatever the tolerance."""
+        axes = {"force.phase": np.random.default_rng(5).uniform(0.0, 2.0 * pi, 60)}
+
+        def found(mass, **solver):
+            rest = {"stiffness": 0.0, "velocity": 0.0, "start": (0.0, 0.0), "span": 20.0}
+            scene = between(-0.02, 0.03, 0.99, mu_k=0.02, mass=mass, force=(4.0 * mass, 0.3), **rest)
+            return ringsweep.sweep(scene, axes, solver={"method": "event"} | solver, progress=False)
+
+        first = found(1.0)
+        for second in found(0.37), found(1.0, rtol=1e-13):
+            bound = (first.x_end_error + second.x_end_error).values
+            assert np.isfinite(bound).mean() > 0.2
+            assert not (abs(first.x_end - second.x_end).values > 3.0 * bound).any()
+
+
 @pytest.mark.slow
 class TestJumps:
     """Forces and velocities of the belt that jump while the body is between its stops, or at one."""

@@ -49,6 +49,9 @@ _CONSTANT, _VARYING = (0.8, 0.04, 0.04, 0.2, 0.0), (1.5, 0.05, 0.2, 0.2, 0.1)
 _SMOOTH, _BRISTLES = (1.5, 0.08, 0.2, 0.4, 0.03), (2.0, 0.2, 1.0, 0.2, 0.0)
 _PLACES = 0.5
 
+# Some rounding errors.
+_ROUNDED = 1e-14
+
 # Impacts magnify the errors before them: a small difference of two runs is then less certain by this factor.
 _MAGNIFIED = 3.0
 
@@ -63,6 +66,12 @@ _WORDS: dict[type, str] = {SetValued: "is set-valued", Smooth: "is smooth", Dyna
 def _select(batch: Any, cells: NDArray[np.intp]) -> Any:
     """The given cells of a batch; the batch itself, without a copy, if these are all cells."""
     return batch if len(cells) == len(batch.span) else take(batch, cells)
+
+
+def _shared(method: _Piecewise, runs: Results) -> NDArray[np.float64]:
+    """Mean relative error of a step that runs by a method share with runs at a looser tolerance, and its rounding."""
+    of_steps = method.tolerances()[0] * LocalErrors(*runs.audits[:, 3:].T).series
+    return np.asarray(_ROUNDED + of_steps / np.maximum(runs.steps, 1.0))
 
 
 @dataclass(frozen=True)
@@ -118,9 +127,9 @@ class _Piecewise(Method):
             return Result(rows, steps=steps, certified=because == CERTIFIED, because=because, errors=bounds)
         finer, distance = self, np.full(len(rows), np.inf)
         looser = self.looser()
-        cells = audit.disturbed(_select(batch, open_cells))
-        second_rows, more_steps, _ = self.integrate(cells, len(outcomes), audit=False, tolerances=looser)
         new = Results(rows[open_cells], steps[open_cells], audits[open_cells])
+        cells = audit.disturbed(_select(batch, open_cells), _shared(self, new))
+        second_rows, more_steps, _ = self.integrate(cells, len(outcomes), audit=False, tolerances=looser)
         for retry in range(_MOST_RETRIES + 1):
             runs = TwoRuns(_select(batch, open_cells), new.rows, second_rows, outcomes)
             because[open_cells], found, distance[open_cells], may_converge = finer._compare(
@@ -134,14 +143,15 @@ class _Piecewise(Method):
             steps[open_cells] += more_steps
             finished = ~self._given_up(new.rows, new.steps, outcomes)
             rows[open_cells[finished]] = new.rows[finished]
-            open_cells = open_cells[finished & ((because[open_cells] != CERTIFIED) | may_converge)]
+            is_open = finished & ((because[open_cells] != CERTIFIED) | may_converge)
+            open_cells, share = open_cells[is_open], _shared(finer, new)[is_open]
             looser, finer = finer.tolerances(), replace(finer, rtol=finer.rtol / FACTOR)
             if retry == _MOST_RETRIES or not len(open_cells) or not 1e-15 <= finer.tolerances()[0] < looser[0]:
                 break
             second_rows = rows[open_cells]
             cells = _select(batch, open_cells)
             # Each run is compared with a disturbed one, or a disturbed run with one that is not.
-            cells = cells if retry % 2 else audit.disturbed(cells)
+            cells = cells if retry % 2 else audit.disturbed(cells, share)
             new = finer.integrate(cells, len(outcomes), audit=True)
             more_steps = new.steps
         return Result(rows, steps=steps, certified=because == CERTIFIED, because=because, errors=bounds)

@@ -49,8 +49,11 @@ def _least_scales_on_belt(batch):
 
 
 @audit.disturbed.implements(Belt)
-def _disturbed_zones(batch):
-    """Implement :func:`audit.disturbed`: edges of zones on the belt are rounded otherwise; narrow ones magnify it."""
+def _disturbed_rebounds_and_edges(batch, share):
+    """Implement :func:`audit.disturbed`: impacts magnify an error, and so do narrow zones that of their edges."""
+    if batch.stops:
+        stops = batch.stops
+        batch = batch._replace(stops=stops._replace(restitution=stops.restitution * (1.0 - share)))
     if not isinstance(batch.surface, Segments):
         return batch
     ruler = batch.surface.ruler

@@ -113,16 +113,18 @@ def same_statistics(batch, one, other):
 
 
 @hook(optional=True)
-def disturbed(batch):
-    """Cells of which a number differs by rounding, for the second run of a certificate.
+def disturbed(batch, share):
+    """Cells of which a number differs a little, for the second run of a certificate.
 
-    Where a motion is in closed form, two resolutions agree to the last bit, and do not show how its rounding grows. It
-    runs outside kernels.
+    Where a motion is in closed form, two resolutions agree to the last bit, and do not show how its rounding grows; nor
+    do they show how the errors of steps grow that both take. It runs outside kernels.
 
     Parameters
     ----------
     batch : NamedTuple
         Cells. The type of the batch decides which body runs.
+    share : ndarray of shape ``(cells,)``
+        Relative error that both runs share: rounding, and that of steps.
 
     Returns
     -------

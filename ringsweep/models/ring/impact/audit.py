@@ -129,14 +129,10 @@ def _all_lost(one):
     return SimpleNamespace(**vars(one) | {"separating_contact": contacts})
 
 
-# Share by which the restitution of a second run differs: some rounding errors.
-_DISTURBANCE = 1e-14
-
-
 @audit.disturbed.implements(ImpactRing)
-def _disturbed_restitution(batch):
+def _disturbed_restitution(batch, share):
     """Implement :func:`audit.disturbed`: flights are in closed form, so only the restitution is disturbed."""
-    return batch._replace(restitution=batch.restitution * (1.0 - _DISTURBANCE))
+    return batch._replace(restitution=batch.restitution * (1.0 - share))
 
 
 @audit.least_scales.implements(ImpactRing)
