@@ -172,6 +172,26 @@ def test_body_that_a_force_takes_through_the_band_has_not_stopped():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("law", ["bengisu-akay", "lugre"])
+def test_a_body_under_which_its_belt_accelerates_at_launch_has_not_stopped(law):
+    """Under any method: the body would need more than the breakaway force to keep up with the belt."""
+    of_law = {
+        "bengisu-akay": {"alpha": 10.0, "v0": 0.01},
+        "lugre": {"sigma0": 1e3, "sigma1": 10.0, "sigma2": 0.1, "v_s": 0.01},
+    }
+    of = scene(law, k=1.0, drive=(1.0, 1.0), span=2.0, mu_s=0.3, mu_k=0.2, **of_law[law])
+    rng = np.random.default_rng(1)
+    axes = {"amplitude": rng.uniform(0.01, 2.0, 60), "frequency": rng.uniform(0.1, 2.0, 60), "phase": rng.random(60)}
+    axes = {f"drive.{name}": xr.DataArray(column, dims="cell") for name, column in axes.items()}
+    first, second = (
+        ringsweep.sweep(of, axes, solver=method, progress=False)
+        for method in ({"method": "auto"}, {"method": "rk4", "steps": 10_000})
+    )
+    np.testing.assert_array_equal(second.slips, first.slips)
+    assert 10 < (first.slips == 0).sum() < 60
+
+
+@pytest.mark.slow
 class TestBreakingLoose:
     """A body launched at the belt's speed rides until k v t = mu_s F_N, at 0.5 s."""
 

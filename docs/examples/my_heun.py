@@ -29,8 +29,9 @@ def _run(batch, steps, outcomes, times, rows):
         scene = take(batch, i)
         h = scene.span / steps
         y = constant_step.initial_state(scene)
-        now = constant_step.inspect(scene, y, drives.turn(scene.drive, 0.0))
-        record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now))
+        forcing = drives.turn(scene.drive, 0.0)
+        now = constant_step.inspect(scene, y, forcing)
+        record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now, forcing[2]))
         status, k = RUNNING, 0
         while True:
             t = k * h if k < steps else scene.span
@@ -43,7 +44,7 @@ def _run(batch, steps, outcomes, times, rows):
                 break
             y_next, after = _step(scene, y, now, t, h)
             status, _ = constant_step.verdict(scene, now, after)
-            stuck, seen = constant_step.sticks(scene, now, after), constant_step.seen(scene, y_next, after)
+            stuck, seen = constant_step.sticks(scene, now, after), constant_step.seen(scene, y_next, after, 0.0)
             record = recorder.observe(scene, record, t + h, h, stuck, seen)
             y, now, k = y_next, after, k + 1
         outcome = recorder.conclude(scene, record, COMPLETE if status == RUNNING else status, t, y[0], y[1])

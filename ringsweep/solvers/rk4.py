@@ -26,6 +26,7 @@ from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, side_by_side, size_of, write
 from ringsweep.numerics.rows import distinct_rows
+from ringsweep.numerics.terms import joined
 from ringsweep.physics.drives import lookup, pass_knot, shape_numbers, table_row, turn, without_shape
 from ringsweep.physics.friction import TRAITS
 from ringsweep.quantities.flags import CERTIFIED, COARSE, FAILED, NO_RESULT, NOT_ASKED, SEPARATING
@@ -345,7 +346,7 @@ def _advance_lanes(diagnosed, batch, block, table, stretch, k):
             live = select(ended, ENDING, live)
             break
         diagnosis = conform(_diagnose(diagnosed, scene, diagnosis, now, after, h), diagnosis)
-        stuck, seen = constant_step.sticks(scene, now, after), constant_step.seen(scene, y_next, after)
+        stuck, seen = constant_step.sticks(scene, now, after), constant_step.seen(scene, y_next, after, 0.0)
         record = conform(recorder.observe(scene, record, (first + k + 1) * h, h, stuck, seen), record)
         y, now, live = y_next, after, abs(live)
         k += 1
@@ -371,7 +372,7 @@ def _finish_ended(diagnosed, batch, block, table, stretch, k, results):
                 live = FINISHED
                 diagnosis = _diagnose(diagnosed, scene, run.diagnosis, run.now, after, h)
                 t = (first + k + fraction) * h
-                stuck, seen = constant_step.sticks(scene, run.now, after), constant_step.seen(scene, y_end, after)
+                stuck, seen = constant_step.sticks(scene, run.now, after), constant_step.seen(scene, y_end, after, 0.0)
                 record = recorder.observe(scene, run.record, t, fraction * h, stuck, seen)
                 # The margin does not cover the contact that separates in this step.
                 diagnosis = Diagnosis(diagnosis.eigenvalue, run.diagnosis.margin, diagnosis.arc_share)
@@ -401,23 +402,23 @@ def prepare(batch: Any) -> tuple[Any, Any]:
     -------
     tuple
         The cells, each number in an array of its own, with drives from which the shape is removed: so the kernels are
-        compiled once for all drives. And the initial states: a tuple with an array of shape ``(cells,)`` for each
-        component.
+        compiled once for all drives. And the launches: a tuple with an array of shape ``(cells,)`` for the acceleration
+        of the drive, and for each component of the initial states.
     """
     components = len(constant_step.initial_state(take(batch, 0)))
-    launches = tuple(np.empty(len(batch.span)) for _ in range(components))
+    launches = tuple(np.empty(len(batch.span)) for _ in range(1 + components))
     _launch(Cells(batch), launches)
     return Cells(side_by_side(batch._replace(drive=without_shape(batch.drive)))), launches
 
 
 @kernel
 def _launch(batch, launches):
-    """Fill `launches`, one array for each component, with the initial states."""
+    """Fill `launches`; see :func:`prepare`."""
     for cell in range(len(launches[0])):
         scene = take(batch, cell)
         # A run before this one has left its last piece.
         pass_knot(scene.drive, 0.0)
-        put(launches, cell, constant_step.initial_state(scene))
+        put(launches, cell, joined((turn(scene.drive, 0.0)[2],), constant_step.initial_state(scene)))
 
 
 def integrate(
@@ -430,7 +431,7 @@ def integrate(
     diagnosed : Diagnosed or tuple
         Whether the diagnosis of each run is recorded; an empty tuple if not.
     batch, launches : nested tuple of ndarray
-        Cells and their initial states, from :func:`prepare`.
+        Cells and their launches, from :func:`prepare`.
     drive : NamedTuple
         Drive of one of the cells.
     cells : ndarray of int
@@ -534,9 +535,10 @@ def _inspection_at_launch(scene, y, table):
 @inlined
 def _initial_run(batch, launches, cell, table):
     """Run of a cell at t = 0. With any table it also serves as an example of the type."""
-    scene, y = take(batch, cell), take(launches, cell)
+    scene, launch = take(batch, cell), take(launches, cell)
+    y = launch[1:]
     now = _inspection_at_launch(scene, y, table)
-    record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now))
+    record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now, launch[0]))
     return _Run(y, now, record, Diagnosis(0.0, inf, 0.0), LIVE)
 
 

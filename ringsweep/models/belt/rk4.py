@@ -44,10 +44,11 @@ def _inspect_on_belt(scene, y, forcing):
 
 
 @constant_step.seen.implements(Belt, BristleBelt)
-def _seen_in_constant_step_on_belt(scene, y, now):
+def _seen_in_constant_step_on_belt(scene, y, now, epsilon):
     """Implement :func:`constant_step.seen`: what ``_observe_on_belt`` in :mod:`record` takes."""
-    # Only at launch the record takes the acceleration for the rate of the sliding velocity, and differences later.
-    return y[0], now.motion[2], now.friction, now.place, moving(scene, now.v, now.v, 0.0), now.rates[1], (), nan
+    # The rate of the sliding velocity counts at launch alone.
+    v, v_rate = moving(scene, now.v, now.v, 0.0), now.rates[1] - epsilon
+    return y[0], now.motion[2], now.friction, now.place, v, v_rate, (), nan
 
 
 @constant_step.row.implements(Belt, BristleBelt)

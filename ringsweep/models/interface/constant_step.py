@@ -253,7 +253,7 @@ def fall_rate(scene, before, now, h):
 
 
 @hook(absorb=True)
-def seen(scene, y, now):
+def seen(scene, y, now, epsilon):
     """A state as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
 
     Parameters
@@ -265,6 +265,8 @@ def seen(scene, y, now):
     now : NamedTuple
         Inspection of the state. At the end of a run, which lies within a step, it is the inspection at the end of the
         step.
+    epsilon : float
+        Acceleration of the drive at launch, rad/s^2; on the belt m/s^2. 0 later, where the recorder takes differences.
 
     Returns
     -------

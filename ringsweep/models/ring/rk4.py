@@ -58,7 +58,7 @@ def _arc_share_on_ring(scene, now, h):
 
 
 @constant_step.seen.implements(Ring, BristleRing)
-def _seen_in_constant_step_on_ring(scene, y, now):
+def _seen_in_constant_step_on_ring(scene, y, now, epsilon):
     """Implement :func:`constant_step.seen`: what ``_observe_on_ring`` in :mod:`record` takes."""
     return y[0], y[1], now.normal_1, now.normal_2, ()
 
