@@ -140,6 +140,16 @@ class TestRandomScenes:
             counts = (ds.impacts.values[relations.sure(first, second)] for ds in (first, second))
             np.testing.assert_array_equal(*counts)
 
+    def test_launch_that_either_contact_could_carry_alone_ends_at_once(self):
+        """Neither is chosen, and without both one of them would close again."""
+        run = relations.random_scenes(KINDS["ring-impact"], 12_000, rng := np.random.default_rng(1))
+        numbers = run.numbers | {"initial.omega": np.zeros(12_000), "time.span": np.full(12_000, 1e-3)}
+        numbers |= {path: 3.0 * column for path, column in numbers.items() if "mu_" in path}
+        numbers["drive.amplitude"] = numbers["drive.amplitude"] * rng.choice([10.0, 100.0], 12_000)
+        found = relations.Run(run.kind, numbers, run.scene).outcomes(solver={"method": "auto", "certify": False})
+        assert not (ringsweep.words(found.regime) == "failed").any()
+        assert (found.separating_contact[found.t_end == 0.0] == 3).any()
+
     @pytest.mark.slow
     def test_time_of_stick_on_bristles_does_not_depend_on_the_resolution(self):
         """The guard of stick is the least of four, and has corners within long steps."""

@@ -162,8 +162,14 @@ def _opened(scene, t, y, before, which, zeros, event):
         if _presses(scene, which, motion_of(scene, state, ring_omega)):
             # Neither contact can carry the body alone, and without both the one that is lost would close again.
             return JAM, opened, state
-    state = state_in_flight(motion_of(scene, y, ring_omega), turned, (0.0, 0.0))
-    return RUNNING, in_flight((before.place_1, before.place_2), turned, (zeros, zeros), event), state
+    motion = motion_of(scene, y, ring_omega)
+    state = state_in_flight(motion, turned, (0.0, 0.0))
+    flight = in_flight((before.place_1, before.place_2), turned, (zeros, zeros), event)
+    several = which == BOTH and ring.contact_count(scene.closed.body) == 2
+    if several and (_presses(scene, 1, motion) or _presses(scene, 2, motion)):
+        # Each contact can carry the body alone, and without both one of them would close again.
+        return JAM, flight, state
+    return RUNNING, flight, state
 
 
 @inlined
