@@ -59,7 +59,7 @@ def belt(law: str, **numbers: float) -> dict[str, Any]:
 
 STICTION = ring("stiction")
 STIFF = ring("bengisu-akay", alpha=1e5, v0=2e-6)
-SMOOTH = ring("bengisu-akay", alpha=100.0, v0=0.01)
+SMOOTH, SMOOTH_BELT = (scene("bengisu-akay", alpha=100.0, v0=0.01) for scene in (ring, belt))
 
 
 class Sweep(NamedTuple):
@@ -103,13 +103,14 @@ SWEEPS = {
     "event, belt": Sweep(belt("stiction"), (64, 1024, 16384), _ON_BELT),
     "event, forced belt": Sweep(_FORCED, (64, 256, 1024), _BY_FORCE),
     "implicit, smooth": Sweep(SMOOTH, (64, 1024, 4096)),
+    "implicit, smooth belt": Sweep(SMOOTH_BELT, (64, 1024, 4096), _ON_BELT),
     "implicit, default map": Sweep(STIFF, (64, 576, 2304)),
     "implicit, LuGre belt": Sweep(
         belt("lugre", sigma0=1e5, sigma1=316.2, sigma2=0.4, v_s=1e-3), (16, 64, 256), _ON_BELT
     ),
     "implicit, ring with bristles": Sweep(ring("lugre", sigma0=1e3, sigma1=30.0, sigma2=0.1, v_s=1e-2), (16, 64, 256)),
     "rk4, ring": Sweep(SMOOTH, (64, 1024, 4096), options=_rk4(1000)),
-    "rk4, belt": Sweep(belt("bengisu-akay", alpha=100.0, v0=0.01), (64, 1024, 16384), _ON_BELT, _rk4(1000)),
+    "rk4, belt": Sweep(SMOOTH_BELT, (64, 1024, 16384), _ON_BELT, _rk4(1000)),
     "refined, event": Sweep(STICTION, (4096, 36864), options={"refine": True}),
     "refined, default map": Sweep(STIFF, (4096, 16384), options={"refine": True}),
     "impact": Sweep(STICTION | {"impact": {"restitution": 0.5}}, (64, 256, 1024)),
