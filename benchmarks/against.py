@@ -11,7 +11,8 @@ start-up are new processes. Both trees run in turn within each round.
 A ratio is the time of the working tree divided by that of the other: the median over the rounds. Its interval is that
 from the second smallest to the second largest of nine ratios, which holds the median in 96 of 100 cases. A row is
 slower if the whole interval lies above 1.03; a row of start-up above 1.10. *A step* is the ratio of the times of a
-step, for rows in which the trees take different numbers of steps.
+step, for rows in which the trees take different numbers of steps. All rounds of a row are in one pair of processes, and
+pairs differ by up to 4 %, which no interval shows: measure a row that is slower again, with --only.
 
 `best.txt` names the fastest tree on its first line. A row that this tree lacks is compared with the tree on the next
 line. Exit status 1: a row is slower.
@@ -154,7 +155,7 @@ class Row(NamedTuple):
         ]  # fmt: skip
 
 
-HEADER = ["row", "against", "old", "new", "ratio", "interval", "a step", ""]
+HEADER = ["row", "against", "old", "new", "new / old", "interval", "a step", ""]
 
 
 # ---- calls ------------------------------------------------------------------------------------
