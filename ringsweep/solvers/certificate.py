@@ -299,7 +299,7 @@ def errors(
             if names[k] in _FORCES:
                 bound[:, k] += force_floor * scale[:, k]
             if names[k].startswith("force_max"):
-                bound[:, k] += friction_floor * scale[:, k]
+                bound[:, k] += friction_floor * np.fmax(scale[:, k], least_scales(runs.batch).get("friction", 0.0))
     # A run that reaches the end of the span has an exact time of its end, and without an event nothing jumps.
     one, _ = runs.named
     end, jumps = names.index("t_end"), _columns_of(runs, "jump_max")

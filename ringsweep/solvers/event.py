@@ -190,8 +190,8 @@ class _Piecewise(Method):
         # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
         ratio = tolerance ** (1.0 / ORDER)
         remainder = tolerance * ratio / (1.0 - ratio)
-        # In the stiction band the error of the velocity, a share of the band, is that of friction, a share of it.
-        friction_floor = np.where(local.implicit > 0.0, implicit_tolerance, 0.0)
+        # In the stiction band the error of the velocity, as a share of the band, is that of friction, of breakaway.
+        friction_floor = np.where(local.implicit + local.place > 0.0, implicit_tolerance, 0.0)
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         _, magnified, left_out = audit.of_events(batch, runs.named[0])
         is_constant = family is SetValued and not varies(take(batch, 0).law, 0)

@@ -41,11 +41,13 @@ _FALL_FACTOR = 5.0
 def _least_scales_on_belt(batch):
     """Implement :func:`audit.least_scales`: of times, s, that of a swing on the spring; of velocities that of a launch.
 
-    A body that is launched at rest on the spot slides on its belt.
+    A body that is launched at rest on the spot slides on its belt. In a creep friction is small beside breakaway.
     """
     with np.errstate(divide="ignore", over="ignore"):
         swing = np.sqrt(batch.body.mass / np.abs(batch.body.stiffness))
-    return {"s": np.minimum(swing, batch.span), "m s-1": np.abs(batch.initial_v)}
+    load = ring.reactions(batch.body, 0.0, 0.0, (batch.initial_x, 0.0, 0.0))[0]
+    breakaway = np.atleast_2d(batch.mu_s).max(axis=0) * np.abs(load)
+    return {"s": np.minimum(swing, batch.span), "m s-1": np.abs(batch.initial_v), "friction": breakaway}
 
 
 @audit.disturbed.implements(Belt)

@@ -149,7 +149,7 @@ def least_scales(batch):
     -------
     dict of ndarray
         Of shape ``(cells,)``. By default there are none: the largest number of each unit is its scale, and the span is
-        added to that of times.
+        added to that of times. With the key "friction": of friction, N, in a creep.
     """
     return {}
 

@@ -66,9 +66,9 @@ def _energy_of_pair(scene, forcing, y):
 
 @audit.least_scales.implements(pair.BeltPair)
 def _least_scales_of_pair(batch):
-    """Implement :func:`audit.least_scales`: those of the slower mass, and of the faster launch."""
+    """Implement :func:`audit.least_scales`: the larger of those of both masses."""
     found = [audit.least_scales(mass) for mass in (batch.first, batch.second)]
-    return {"s": np.maximum(*(scales["s"] for scales in found)), "m s-1": np.maximum(*(f["m s-1"] for f in found))}
+    return {key: np.maximum(*(scales[key] for scales in found)) for key in found[0]}
 
 
 def _of_masses(found):
