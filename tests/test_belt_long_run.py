@@ -152,6 +152,40 @@ def test_swing_of_short_slips_between_stops_is_their_length(amplitude):
     np.testing.assert_allclose(found.swing, 2.0 * abs(found.x_end), rtol=1e-6)
 
 
+def test_short_slips_of_one_step_obey_the_balance_of_energy():
+    """The force is hardly above friction. A slip is one step from rest to rest, which two nodes do not integrate."""
+    of = scene("coulomb", 0.4 * pi, 0.3, v_belt=0.0, mu_k=0.3)
+    found = ringsweep.sweep(of, {"force.amplitude": [0.3015, 0.303, 0.306, 0.31]})
+    assert found.certified.all()
+    assert (found.slips > 10).all()
+
+
+@pytest.mark.slow
+def test_swing_on_bristles_does_not_depend_on_the_end_of_the_span():
+    """A turn within the step in which a period ends is of the period in which it lies."""
+    of = {
+        "model": "belt",
+        "body": {"mass": 1.3},
+        "spring": {"stiffness": 210.0},
+        "belt": {"velocity": 0.12, "incline": 0.0523598775598},
+        "damper": {"coefficient": 0.8},
+        "friction": {
+            "law": "lugre",
+            "mu_s": 0.45,
+            "mu_k": 0.44,
+            "v_s": 0.01,
+            "sigma0": 2e4,
+            "sigma1": 20.0,
+            "sigma2": 0.5,
+        },
+        "force": {"amplitude": 4.0, "frequency": 3.5, "phase": 0.35, "constant": 0.5},
+        "stops": {"low": -0.008, "high": 0.022, "restitution": 0.55},
+        "initial": {"x": 0.003, "velocity": -0.02},
+    }
+    found = ringsweep.sweep(of | {"time": {"span": 8.0}}, {"time.span": [7.7, 8.0, 10.0, 12.0, 15.0]})
+    np.testing.assert_allclose(found.swing, 0.0150589, rtol=1e-5)
+
+
 def test_period_of_three_cycles_that_becomes_one_is_not_settled():
     found = hartog(1.4967889908256882, 0.05, [800.0, 8000.0])
     assert found.settled.values.tolist() == [0, 1]

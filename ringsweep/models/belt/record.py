@@ -418,8 +418,11 @@ def _cycles(scene, r, stops, now, v, turn, span):
     if any_of(halfway):
         share = select(now.duration > 0.0, 1.0 - (now.t - c.next) / now.duration, 1.0)
         c = select_all(halfway, _with_half(c, period, c.next, between(last, now, share)), c)
-    low = select(turn.is_least, min(c.low, turn.x), c.low)
-    high = select(turn.is_greatest, max(c.high, turn.x), c.high)
+    count = select(due, cycles.number_at(c, period, now.t), c.count)
+    # A turn after the end of a cycle is of the next one.
+    later = due & (turn.t > count * period)
+    low = select(turn.is_least & negated(later), min(c.low, turn.x), c.low)
+    high = select(turn.is_greatest & negated(later), max(c.high, turn.x), c.high)
     # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
     # in stick disturbs this turn.
     backward = v > now.velocity
@@ -427,8 +430,7 @@ def _cycles(scene, r, stops, now, v, turn, span):
     moved = select(backward, turn.x - low, high - turn.x)
     turns = (moved > _least_turn(r, span)) & select(backward, turn.is_greatest, turn.is_least) & (period == inf)
     old = _with_extremes(c, low, high)
-    count = select(due, cycles.number_at(c, period, now.t), c.count + select(turns, 1.0, 0.0))
-    ended = due | turns
+    count, ended = count + select(turns, 1.0, 0.0), due | turns
     if any_of(ended):
         share = select(now.duration > 0.0, 1.0 - (now.t - count * period) / now.duration, 1.0)
         share = select(due, min(max(share, 0.0), 1.0), 1.0)
@@ -444,7 +446,9 @@ def _cycles(scene, r, stops, now, v, turn, span):
         mark = Mark(t_mark, x_mark, v_mark, total, stops.slips)
         # Without forcing the launch is not the end of a cycle.
         new = cycles.closed(scene, c, mark, count, due | (c.count > 0.0), swing, fast, period)
-        return select_all(ended, new, old)
+        low = select(later & turn.is_least, min(new.low, turn.x), new.low)
+        high = select(later & turn.is_greatest, max(new.high, turn.x), new.high)
+        return select_all(ended, _with_extremes(new, low, high), old)
     return old
 
 
