@@ -163,26 +163,12 @@ def test_short_slips_of_one_step_obey_the_balance_of_energy():
 @pytest.mark.slow
 def test_swing_on_bristles_does_not_depend_on_the_end_of_the_span():
     """A turn within the step in which a period ends is of the period in which it lies."""
-    of = {
-        "model": "belt",
-        "body": {"mass": 1.3},
-        "spring": {"stiffness": 210.0},
-        "belt": {"velocity": 0.12, "incline": 0.0523598775598},
-        "damper": {"coefficient": 0.8},
-        "friction": {
-            "law": "lugre",
-            "mu_s": 0.45,
-            "mu_k": 0.44,
-            "v_s": 0.01,
-            "sigma0": 2e4,
-            "sigma1": 20.0,
-            "sigma2": 0.5,
-        },
-        "force": {"amplitude": 4.0, "frequency": 3.5, "phase": 0.35, "constant": 0.5},
-        "stops": {"low": -0.008, "high": 0.022, "restitution": 0.55},
-        "initial": {"x": 0.003, "velocity": -0.02},
-    }
-    found = ringsweep.sweep(of | {"time": {"span": 8.0}}, {"time.span": [7.7, 8.0, 10.0, 12.0, 15.0]})
+    friction = {"law": "lugre", "mu_s": 0.45, "mu_k": 0.44, "v_s": 0.01, "sigma0": 2e4, "sigma1": 20.0, "sigma2": 0.5}
+    force, start = (4.0, 3.5, 0.35), (0.003, -0.02)
+    of = on_belt(friction, 210.0, mass=1.3, damping=0.8, velocity=0.12, force=force, start=start, span=8.0)
+    of["belt"]["incline"], of["force"]["constant"] = 0.0523598775598, 0.5
+    of["stops"] = {"low": -0.008, "high": 0.022, "restitution": 0.55}
+    found = ringsweep.sweep(of, {"time.span": [7.7, 8.0, 10.0, 12.0, 15.0]})
     np.testing.assert_allclose(found.swing, 0.0150589, rtol=1e-5)
 
 

@@ -108,6 +108,14 @@ class TestWhatTheDataDoNotTell:
         assert not found.errorbars
         assert "friction_mu_k:  at initial value" in found.fit_report()
 
+    def test_friction_in_slip_has_hardly_an_influence_soon_after_it_begins(self, caplog):
+        """The first slip begins at 7.36 s."""
+        data = measured(BELT, "x", np.linspace(0.1, 7.4, 40), 0.003, 4)
+        with caplog.at_level(logging.WARNING):
+            ringsweep.fit(BELT, data, "belt.velocity, friction.mu_k=0.05..0.14", start=1)
+        assert "friction.mu_k: the data say little of it" in caplog.text
+        assert "belt.velocity: the data" not in caplog.text
+
 
 class TestCommand:
     @pytest.mark.slow

@@ -171,6 +171,9 @@ def fitted(config: Config, data: Any, vary: Any, start: Any = 8, noise: Any = No
             "intervals are too short; look at the picture, or try wider ranges and more starts",
             alike,
         )
+    for path, width in zip(ranges, high - low, strict=True):
+        if (best.params[dimension(path)].stderr or 0.0) > width:
+            logger.warning("%s: the data say little of it: its standard error is greater than its range", path)
     run = run_points(one, {path: np.array([best.best_values[dimension(path)]]) for path in ranges}, 1).isel(point=0)
     if held := int((t > float(run["t_end"])).sum()):
         early = "the fitted run ends at %.6g s: %d of %d residuals are those of its last state, and say little"
