@@ -222,10 +222,8 @@ def part_before_bend(scene, mode, common, x, x_next):
 
     Parameters
     ----------
-    scene, mode : NamedTuple
-        One cell, and its mode.
-    common : tuple
-        What :func:`common` returned for the state at the beginning of the step.
+    scene, mode, common
+        As for :func:`rates`.
     x, x_next : tuple of float
         States of an implicit step, at its beginning and at its end.
 
